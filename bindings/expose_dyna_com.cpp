@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "bindings.hpp"
+#include "dynacom/dyna_com.hpp"
+
+namespace dynacom::python {
+
+namespace {
+
+bp::list toList(const std::vector<std::string>& names) {
+  bp::list list;
+  for (const std::string& name : names) list.append(name);
+  return list;
+}
+
+bp::list getActiveContacts(const DynaCoM& self) { return toList(self.getActiveContacts()); }
+bp::list getKnownContacts(const DynaCoM& self) { return toList(self.getKnownContacts()); }
+
+std::shared_ptr<ContactBase> getContact(const DynaCoM& self, const std::string& name) {
+  return self.getContact(name);
+}
+
+}  // namespace
+
+void exposeDynaCoM() {
+  using Vector6 = DynaCoM::Vector6;
+  using VectorRef = DynaCoM::VectorRef;
+  using Settings = DynaCoMSettings;
+  const Vector6 no_wrench = Vector6::Zero();
+
+  bp::class_<Settings>("DynaCoMSettings", "What describes a DynaCoM.", bp::init<>(bp::arg("self")))
+      .def_readwrite("urdf", &Settings::urdf,
+                     "Path of a URDF file, or the XML itself. The root joint will be a free-flyer.")
+      .add_property("gravity", getter(&Settings::gravity), setter(&Settings::gravity),
+                    "Along -z or zero, (3,) [m/s²]; (0, 0, -9.81) by default.")
+      .def(SettingsVisitor<Settings>());
+
+  bp::class_<DynaCoM>(
+      "DynaCoM",
+      "The ground wrench of a robot in motion, where it presses, and how the contacts share it.\n\n"
+      "Vectors are in the world's axes, SI units; q is (nq,), v and a are (nv,), as in Pinocchio.\n"
+      "Before computeDynamics all numbers of the motion are NaN.",
+      bp::init<>(bp::arg("self"), "A DynaCoM that waits for initialize()."))
+      .def(bp::init<const Settings&>((bp::arg("self"), bp::arg("settings")),
+                                     "Raises ValueError as initialize()."))
+      .def(bp::init<const pinocchio::Model&>((bp::arg("self"), bp::arg("model")),
+                                             "Raises ValueError as initialize()."))
+      .def<void (DynaCoM::*)(const Settings&)>(
+          "initialize", &DynaCoM::initialize, (bp::arg("self"), bp::arg("settings")),
+          "Reads the robot and forgets the contacts; may be called again. Raises ValueError if the\n"
+          "settings are not valid, the URDF cannot be read or the robot has no mass; nothing has\n"
+          "changed then.")
+      .def<void (DynaCoM::*)(const pinocchio::Model&)>(
+          "initialize", &DynaCoM::initialize, (bp::arg("self"), bp::arg("model")),
+          "The same for a pinocchio.Model, which is copied, with its gravity.")
+      .def("getSettings", &DynaCoM::getSettings, bp::arg("self"), Copied(),
+           "A copy of the settings.")
+      .def("getModel", &DynaCoM::getModel, bp::arg("self"), bp::return_internal_reference<>(),
+           "The robot's model (pinocchio.Model).")
+      .def<pinocchio::Data& (DynaCoM::*)()>(
+          "getData", &DynaCoM::getData, bp::arg("self"), bp::return_internal_reference<>(),
+          "The robot's data (pinocchio.Data). Pinocchio's algorithms may be run on it; contacts\n"
+          "are placed by its oMi.")
+      .def("getMass", &DynaCoM::getMass, bp::arg("self"), "Mass of the robot [kg].")
+      .def("getGroundHeight", &DynaCoM::getGroundHeight, bp::arg("self"),
+           "Height of the flat horizontal ground [m].")
+      .def("setGroundHeight", &DynaCoM::setGroundHeight, (bp::arg("self"), bp::arg("groundHeight")))
+
+      .def("computeDynamics", &DynaCoM::computeDynamics,
+           (bp::arg("self"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
+            bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
+           "Computes the centroidal state, the ground wrench (1, 2), the placements of the\n"
+           "contacts and the centre of pressure: by (5) on flat horizontal ground, else by (6),\n"
+           "after distributing the wrench.\n\n"
+           "q: (nq,); v: (nv,); a: (nv,); extWrench: (6,), force [N] and moment [N·m] about the\n"
+           "centre of mass. Raises ValueError if one has another size.")
+      .def("getGroundCoMForce", &DynaCoM::getGroundCoMForce, bp::arg("self"), Copied(),
+           "Force that the ground must give, (3,) [N].")
+      .def("getGroundCoMTorque", &DynaCoM::getGroundCoMTorque, bp::arg("self"), Copied(),
+           "Moment that the ground must give, about the centre of mass, (3,) [N·m].")
+      .def("getCoM", &DynaCoM::getCoM, bp::arg("self"), Copied(), "Centre of mass, (3,) [m].")
+      .def("getVCoM", &DynaCoM::getVCoM, bp::arg("self"), Copied(), "Its velocity, (3,) [m/s].")
+      .def("getACoM", &DynaCoM::getACoM, bp::arg("self"), Copied(), "Its acceleration (3,) [m/s²].")
+      .def("getAM", &DynaCoM::getAM, bp::arg("self"), Copied(),
+           "Angular momentum about the centre of mass, (3,) [kg·m²/s].")
+      .def("getAMVariation", &DynaCoM::getAMVariation, bp::arg("self"), Copied(),
+           "Its rate, (3,) [N·m].")
+      .def("getCoP", &DynaCoM::getCoP, bp::arg("self"), Copied(),
+           "Centre of pressure, (2,) [m]; NaN where the vertical force is below 1 N or, on uneven\n"
+           "ground, the wrench was not distributed.")
+      .def<void (DynaCoM::*)(double)>(
+          "computeNL", &DynaCoM::computeNL, (bp::arg("self"), bp::arg("omega")),
+          "Computes virtual repellent point and non-linearity, (7, 8), of the last\n"
+          "computeDynamics. omega: > 0 [rad/s], else ValueError.")
+      .def<void (DynaCoM::*)(double, const VectorRef&, const VectorRef&, const VectorRef&,
+                             const Vector6&, bool)>(
+          "computeNL", &DynaCoM::computeNL,
+          (bp::arg("self"), bp::arg("omega"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
+           bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
+          "computeDynamics, then computeNL(omega).")
+      .def("getVRP", &DynaCoM::getVRP, bp::arg("self"), Copied(),
+           "Virtual repellent point, (2,) [m].")
+      .def("getNL", &DynaCoM::getNL, bp::arg("self"), Copied(), "Non-linearity p - v, (2,) [m].")
+
+      .def("addContact", &DynaCoM::addContact,
+           (bp::arg("self"), bp::arg("contact"), bp::arg("name"), bp::arg("active") = true),
+           "Makes a contact known under a name. It is shared, not copied. Raises ValueError if the\n"
+           "name is taken, the contact known or not initialised, or its frame not in the model.")
+      .def("removeContact", &DynaCoM::removeContact, (bp::arg("self"), bp::arg("name")),
+           "Forgets a contact. Raises ValueError if the name is not known.")
+      .def("activateContact", &DynaCoM::activateContact, (bp::arg("self"), bp::arg("name")),
+           "The contact takes part from now on, as the last in order. Raises ValueError if the\n"
+           "name is not known.")
+      .def("deactivateContact", &DynaCoM::deactivateContact, (bp::arg("self"), bp::arg("name")),
+           "The contact takes no part any more, its force becomes zero. Raises ValueError if the\n"
+           "name is not known.")
+      .def("addContact6d", &DynaCoM::addContact6d,
+           (bp::arg("self"), bp::arg("contact"), bp::arg("name"), bp::arg("active") = true),
+           "Another name of addContact.")
+      .def("removeContact6d", &DynaCoM::removeContact6d, (bp::arg("self"), bp::arg("name")),
+           "Another name of removeContact.")
+      .def("activateContact6d", &DynaCoM::activateContact6d, (bp::arg("self"), bp::arg("name")),
+           "Another name of activateContact.")
+      .def("deactivateContact6d", &DynaCoM::deactivateContact6d, (bp::arg("self"), bp::arg("name")),
+           "Another name of deactivateContact.")
+      .def("getContact", &getContact, (bp::arg("self"), bp::arg("name")),
+           "The contact of that name. Raises ValueError if it is not known.")
+      .def("getActiveContacts", &getActiveContacts, bp::arg("self"),
+           "Names of the active contacts, in the order of their activation.")
+      .def("getKnownContacts", &getKnownContacts, bp::arg("self"),
+           "Names of all contacts: the active ones, then the others.")
+
+      .def("distributeForce", &DynaCoM::distributeForce,
+           (bp::arg("self"), bp::arg("groundCoMForce"), bp::arg("groundCoMTorque"), bp::arg("com")),
+           "Shares a wrench between the active contacts, placed by getData(): the cheapest forces\n"
+           "within all inequalities that give it, (9-13). Each contact is given its force, zero\n"
+           "unless solved. Returns the DistributionStatus.\n\n"
+           "groundCoMForce: (3,) [N]; groundCoMTorque: (3,), about the centre of mass [N·m];\n"
+           "com: (3,) [m].")
+      .def("getDistributionStatus", &DynaCoM::getDistributionStatus, bp::arg("self"),
+           "How the last distribution ended.")
+      .def("uni_A", &DynaCoM::uni_A, bp::arg("self"),
+           "Unilaterality of the active contacts, block-diagonal.")
+      .def("uni_b", &DynaCoM::uni_b, bp::arg("self"))
+      .def("fri_A", &DynaCoM::fri_A, bp::arg("self"),
+           "Friction of the active contacts, block-diagonal.")
+      .def("fri_b", &DynaCoM::fri_b, bp::arg("self"))
+      .def("reg_A", &DynaCoM::reg_A, bp::arg("self"), "Weights of the active contacts, stacked.")
+      .def("reg_b", &DynaCoM::reg_b, bp::arg("self"))
+      .def("ne_A", &DynaCoM::ne_A, bp::arg("self"),
+           "Newton-Euler matrices of the active contacts, side by side, (6, n).")
+      .def("ne_b", &DynaCoM::ne_b, bp::arg("self"), Copied(),
+           "The wrench that the last distribution was asked for, (6,).")
+      .def("allForces", &DynaCoM::allForces, bp::arg("self"),
+           "Forces of the active contacts, stacked, each in its surface's frame.")
+      .def(CopyVisitor<DynaCoM>());
+}
+
+}  // namespace dynacom::python

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "bindings.hpp"
+#include "dynacom/wrench_distribution.hpp"
+
+namespace dynacom::python {
+
+void exposeWrenchDistribution() {
+  bp::enum_<DistributionStatus>("DistributionStatus", "How a distribution ended.")
+      .value("Solved", DistributionStatus::Solved)
+      .value("Infeasible", DistributionStatus::Infeasible)
+      .value("NoContact", DistributionStatus::NoContact)
+      .value("NumericalFailure", DistributionStatus::NumericalFailure);
+
+  bp::class_<WrenchDistribution>(
+      "WrenchDistribution",
+      "How contacts share a wrench: the cheapest forces within all inequalities that give it,\n"
+      "equations (9-13). clear(), add() every contact, solve(), forces().",
+      bp::init<>(bp::arg("self")))
+      .def("clear", &WrenchDistribution::clear, bp::arg("self"),
+           "Begins a new problem, without contacts.")
+      .def("add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact")),
+           "Adds a contact with the matrices that it has now.")
+      .def("solve", &WrenchDistribution::solve, (bp::arg("self"), bp::arg("wrench")),
+           "Solves for the forces that give a wrench, (6,): force [N], moment [N·m] about the\n"
+           "centre of mass, world axes. Returns the DistributionStatus.")
+      .def("forces", &WrenchDistribution::forces, bp::arg("self"), Copied(),
+           "The forces of all contacts, in the order of add(), each in its surface's frame; zero\n"
+           "unless solved.")
+      .def(CopyVisitor<WrenchDistribution>());
+}
+
+}  // namespace dynacom::python

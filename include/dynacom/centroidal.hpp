@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <pinocchio/multibody.hpp>
+
+#include "dynacom/export.hpp"
+
+namespace dynacom {
+
+/// The motion of a robot's centre of mass c, and its momentum about it, in the world's axes.
+struct CentroidalState {
+  double mass;                  ///< m [kg]
+  Eigen::Vector3d com;          ///< c, world [m]
+  Eigen::Vector3d vcom;         ///< ċ [m/s]
+  Eigen::Vector3d acom;         ///< c̈ [m/s²], without gravity
+  Eigen::Vector3d am;           ///< L, angular momentum about c [kg·m²/s]
+  Eigen::Vector3d amVariation;  ///< L̇ [N·m]
+};
+
+/// A wrench about the CoM, in the world's axes.
+struct CentroidalWrench {
+  Eigen::Vector3d force;   ///< f [N]
+  Eigen::Vector3d torque;  ///< τ about c [N·m]
+};
+
+/// The centroidal state of a robot in motion, by pinocchio::computeCentroidalMomentumTimeVariation,
+/// which leaves kinematics (oMi, v, a) and momenta (hg, dhg) in data.
+/// @param q  configuration, model.nq
+/// @param v  velocity, model.nv
+/// @param a  acceleration, model.nv
+/// @throws std::invalid_argument if a vector has another size
+DYNACOM_EXPORT CentroidalState computeCentroidalState(const pinocchio::Model& model, pinocchio::Data& data,
+                                       const Eigen::Ref<const Eigen::VectorXd>& q,
+                                       const Eigen::Ref<const Eigen::VectorXd>& v,
+                                       const Eigen::Ref<const Eigen::VectorXd>& a);
+
+/// The centroidal state found in data, in which
+/// pinocchio::computeCentroidalMomentumTimeVariation(model, data, q, v, a) has run before.
+DYNACOM_EXPORT CentroidalState readCentroidalState(const pinocchio::Data& data);
+
+/// Newton and Euler, equations (1, 2): the wrench about c that the ground must give,
+///
+///     f = m (c̈ − g) − f_e      τ = L̇ − τ_e
+///
+/// @param gravity    g, world [m/s²]
+/// @param extWrench  (f_e [N], τ_e [N·m]): what else acts on the robot, about c, world axes
+DYNACOM_EXPORT CentroidalWrench computeGroundWrench(const CentroidalState& state, const Eigen::Vector3d& gravity,
+                                     const Eigen::Matrix<double, 6, 1>& extWrench);
+
+/// Below this vertical force a centre of pressure means nothing [N].
+constexpr double kMinimalVerticalForce = 1.;
+
+/// Centre of pressure of a ground wrench on flat horizontal ground, equation (5),
+///
+///     p = c + (S τ − f (c_z − h)) / f_z,   S = [0 −1; 1 0]
+///
+/// of which x and y are meant.
+/// @param com           c, world [m]
+/// @param groundHeight  h, world [m]
+/// @return p, world [m]; NaN where f_z is below kMinimalVerticalForce
+DYNACOM_EXPORT Eigen::Vector2d computeFlatGroundCoP(const CentroidalWrench& groundWrench,
+                                     const Eigen::Vector3d& com, double groundHeight = 0.);
+
+/// Virtual repellent point on the ground's plane, equation (7): v = c − c̈ / ω² [m].
+/// @param omega  ω > 0, natural frequency of the linear inverted pendulum [rad/s]
+/// @throws std::invalid_argument unless ω > 0
+DYNACOM_EXPORT Eigen::Vector2d computeVRP(const CentroidalState& state, double omega);
+
+}  // namespace dynacom

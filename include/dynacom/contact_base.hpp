@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <memory>
+#include <pinocchio/spatial.hpp>
+#include <string>
+
+#include "dynacom/errors.hpp"
+#include "dynacom/export.hpp"
+
+namespace dynacom {
+
+/// What every contact is: a frame of the robot, through which the environment gives the robot a
+/// force λ, limited by linear inequalities.
+///
+/// λ is expressed in the surface's frame s, whose z axis is the surface's normal, pointing into the
+/// robot. It has cols() components: the force [N], then, for surfaces, the moment [N·m] about the
+/// origin of s.
+///
+///     U λ ≤ u     unilaterality   uni_A(), uni_b()
+///     C λ ≤ c     friction        fri_A(), fri_b()
+///     wᵢ λᵢ       what is squared and summed in the cost of a distribution: reg_A() holds wᵢ
+///     NE λ        the contact's wrench about the CoM, in the world's axes: ne_A()
+///
+/// The friction inequalities |f_x|, |f_y| ≤ μ f_z are a pyramid around the friction cone: on its
+/// diagonals they allow √2 μ f_z.
+///
+/// A contact is described by its settings, which the derived classes hold. Until it has them,
+/// cols() is 0.
+class DYNACOM_EXPORT ContactBase {
+ public:
+  using SE3 = pinocchio::SE3;
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  using FrameIndex = pinocchio::FrameIndex;
+
+  /// The value of getFrameID() as long as nobody has looked the frame up in a model.
+  static constexpr FrameIndex kUnknownFrame = std::numeric_limits<FrameIndex>::max();
+
+  virtual ~ContactBase() = default;
+
+  /// A copy of this contact, sharing nothing with it.
+  virtual std::shared_ptr<ContactBase> clone() const = 0;
+
+  /// Name of the frame, in the robot's model, that the contact is attached to.
+  virtual const std::string& getFrameName() const = 0;
+
+  /// Index of that frame in a model, or kUnknownFrame. DynaCoM::addContact sets it.
+  FrameIndex getFrameID() const { return frame_id_; }
+  void setFrameID(FrameIndex frame_id) { frame_id_ = frame_id; }
+
+  /// Placement of the contact's frame in the world, as last given to setPose() or
+  /// updateNewtonEuler(); the identity before.
+  const SE3& getPose() const { return pose_; }
+  void setPose(const SE3& pose) { pose_ = pose; }
+
+  /// Placement oMs of the surface in the world: getPose(), unless the settings say otherwise
+  /// (ContactPointSettings::world_aligned, ContactPointSettings::radius).
+  virtual SE3 getSurfacePose() const { return pose_; }
+
+  /// Number of rows of uni_A(), of fri_A(), and number of components of λ.
+  Eigen::Index uni_rows() const { return uni_A_.rows(); }
+  Eigen::Index fri_rows() const { return fri_A_.rows(); }
+  Eigen::Index cols() const { return reg_A_.size(); }
+
+  /// Unilaterality, uni_rows() × cols(), and its right-hand side, uni_rows(), which is zero.
+  const Eigen::MatrixXd& uni_A() const { return uni_A_; }
+  const Eigen::VectorXd& uni_b() const { return uni_b_; }
+
+  /// Friction, fri_rows() × cols(), and its right-hand side, fri_rows(), which is zero.
+  const Eigen::MatrixXd& fri_A() const { return fri_A_; }
+  const Eigen::VectorXd& fri_b() const { return fri_b_; }
+
+  /// Weights wᵢ of the components of λ in the cost ½ Σ (wᵢ λᵢ)², and the value that the cost pulls
+  /// λ to, which is zero; cols() each.
+  const Eigen::VectorXd& reg_A() const { return reg_A_; }
+  const Eigen::VectorXd& reg_b() const { return reg_b_; }
+
+  /// Newton–Euler matrix, 6 × cols(), at the pose and the CoM of the last updateNewtonEuler(): it
+  /// takes λ to the wrench (force, moment) about the CoM in the world's axes.
+  const Eigen::Matrix<double, 6, Eigen::Dynamic>& ne_A() const { return ne_A_; }
+
+  /// Sets the pose and brings ne_A() up to date.
+  /// @param com  position of the centre of mass, world [m]
+  /// @param oMs  placement of the contact's frame in the world
+  void updateNewtonEuler(const Eigen::Vector3d& com, const SE3& oMs);
+
+  /// The force λ in force, cols() components; zero before applyForce().
+  const Eigen::VectorXd& appliedForce() const { return force_; }
+
+  /// Records the force λ that acts here.
+  /// @throws std::invalid_argument if force does not have cols() components
+  void applyForce(const Eigen::Ref<const Eigen::VectorXd>& force);
+
+  /// Nothing acts here any more: the applied force is zero.
+  void deactivate() { force_.setZero(); }
+
+  /// The applied force as a wrench (force [N], moment [N·m]) in the world's axes, about the world's
+  /// origin.
+  Vector6 toWorldForces() const;
+
+  /// The same, about the CoM of the last updateNewtonEuler().
+  Vector6 toCoMForces() const { return ne_A_ * force_; }
+
+  /// Centre of pressure of the applied force, in the surface's plane (x, y of s) [m]; NaN unless the
+  /// normal force is positive.
+  Eigen::Vector2d getCoP() const;
+
+ protected:
+  ContactBase() = default;
+  ContactBase(const ContactBase&) = default;
+  ContactBase& operator=(const ContactBase&) = default;
+
+  /// Gives the matrices their sizes, forgets frame index and force. For initialize().
+  void reset(Eigen::Index uni_rows, Eigen::Index fri_rows, Eigen::Index cols);
+
+  Eigen::MatrixXd uni_A_, fri_A_;
+  Eigen::VectorXd uni_b_, fri_b_, reg_A_, reg_b_;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> ne_A_;
+
+ private:
+  FrameIndex frame_id_ = kUnknownFrame;
+  SE3 pose_ = SE3::Identity();
+  Eigen::VectorXd force_;
+};
+
+}  // namespace dynacom

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <iosfwd>
+#include <memory>
+#include <pinocchio/multibody.hpp>
+#include <string>
+#include <vector>
+
+#include "dynacom/centroidal.hpp"
+#include "dynacom/contact_base.hpp"
+#include "dynacom/wrench_distribution.hpp"
+
+namespace dynacom {
+
+/// What describes a DynaCoM.
+struct DYNACOM_EXPORT DynaCoMSettings {
+  /// The robot: path of a URDF file, or the XML itself. Its root joint will be a free-flyer.
+  std::string urdf;
+  /// Gravity, along −z or zero [m/s²].
+  Eigen::Vector3d gravity = Eigen::Vector3d(0., 0., -9.81);
+
+  /// @throws std::invalid_argument naming the first field out of its range
+  void validate() const;
+  std::string to_string() const;
+  bool operator==(const DynaCoMSettings& other) const;
+  bool operator!=(const DynaCoMSettings& other) const { return !(*this == other); }
+};
+
+DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const DynaCoMSettings& settings);
+
+/// The ground wrench of a robot in motion, where it presses, and how the contacts share it.
+///
+/// A DynaCoM owns a model, its data and an ordered list of contacts: the active ones, in the order
+/// of their activation, then the others. Matrices and forces are stacked in that order. Copying a
+/// DynaCoM copies its contacts too, so that a copy can work in another thread.
+///
+/// Vectors have the sizes of Pinocchio: q has getModel().nq components, v and a have getModel().nv.
+/// Everything is in the world's axes unless another frame is named. Before computeDynamics() all
+/// numbers of the motion are NaN.
+///
+/// Once the contacts are set, computeDynamics(), computeNL(), distributeForce() and the getters
+/// that return references neither allocate nor print, and throw only for mistakes in the program:
+/// a vector of the wrong size, a contact whose frame does not exist.
+class DYNACOM_EXPORT DynaCoM {
+ public:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  using VectorRef = Eigen::Ref<const Eigen::VectorXd>;
+
+  /// A DynaCoM that waits for initialize(): all else throws NotReadyError until then.
+  DynaCoM();
+  /// @throws std::invalid_argument as initialize(settings)
+  explicit DynaCoM(const DynaCoMSettings& settings);
+  /// @throws std::invalid_argument as initialize(model)
+  explicit DynaCoM(const pinocchio::Model& model);
+
+  /// Reads the robot and forgets the contacts; may be called again. Nothing has changed when it
+  /// throws.
+  /// @throws std::invalid_argument if the settings are not valid, the URDF cannot be read, or the
+  ///         robot has no mass
+  void initialize(const DynaCoMSettings& settings);
+
+  /// The same for a model, which is copied, with its gravity; the settings' urdf will be empty.
+  /// @throws std::invalid_argument if gravity does not lie along −z, or the robot has no mass
+  void initialize(const pinocchio::Model& model);
+
+  const DynaCoMSettings& getSettings() const { return settings_; }
+  const pinocchio::Model& getModel() const { return model_; }
+  const pinocchio::Data& getData() const { return data_; }
+  /// One may run Pinocchio's algorithms on it between two calls: contacts are placed by its oMi.
+  pinocchio::Data& getData() { return data_; }
+  /// Mass of the robot [kg].
+  double getMass() const { return mass_; }
+
+  /// Height of the flat horizontal ground in the world, 0 by default [m].
+  double getGroundHeight() const { return ground_height_; }
+  /// @throws std::invalid_argument unless groundHeight is finite
+  void setGroundHeight(double groundHeight);
+
+  /// Computes the centroidal state, the ground wrench by equations (1, 2), the placement of all
+  /// known contacts, and the centre of pressure. On flat horizontal ground that is equation (5).
+  /// Elsewhere the wrench is first distributed, see distributeForce(), and equation (6) gives the
+  /// centre of the vertical pressures,
+  ///
+  ///     p = S τᵒ / f_z,   τᵒ = Σ p_k × (f_k·ẑ) ẑ,   f_z = Σ f_k·ẑ
+  ///
+  /// with p_k the centre of pressure of contact k and f_k its force. Contacts without load drop
+  /// out.
+  /// @param extWrench  (force [N], moment [N·m]) on the robot besides the contacts', about the CoM
+  /// @throws std::invalid_argument if a vector has the wrong size; NotReadyError before
+  ///         initialize()
+  void computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                       const Vector6& extWrench = Vector6::Zero(),
+                       bool flatHorizontalGround = true);
+
+  /// Of the last computeDynamics(): the wrench that the ground must give, about the CoM.
+  const Eigen::Vector3d& getGroundCoMForce() const { return ground_wrench_.force; }    ///< [N]
+  const Eigen::Vector3d& getGroundCoMTorque() const { return ground_wrench_.torque; }  ///< [N·m]
+  /// Of the last computeDynamics(): position, velocity and acceleration of the CoM.
+  const Eigen::Vector3d& getCoM() const { return state_.com; }    ///< [m]
+  const Eigen::Vector3d& getVCoM() const { return state_.vcom; }  ///< [m/s]
+  const Eigen::Vector3d& getACoM() const { return state_.acom; }  ///< [m/s²]
+  /// Of the last computeDynamics(): angular momentum about the CoM, and its rate.
+  const Eigen::Vector3d& getAM() const { return state_.am; }                    ///< [kg·m²/s]
+  const Eigen::Vector3d& getAMVariation() const { return state_.amVariation; }  ///< [N·m]
+  /// Of the last computeDynamics(): centre of pressure [m]. NaN where the vertical force is below
+  /// kMinimalVerticalForce, or, when the ground is not flat, the wrench was not distributed.
+  const Eigen::Vector2d& getCoP() const { return cop_; }
+
+  /// Computes the virtual repellent point v = c − c̈/ω² and the non-linearity n = p − v, equations
+  /// (7, 8), of the last computeDynamics().
+  /// @param omega  ω > 0 [rad/s]
+  /// @throws std::invalid_argument unless ω > 0; NotReadyError before computeDynamics()
+  void computeNL(double omega);
+
+  /// computeDynamics() and computeNL(omega).
+  void computeNL(double omega, const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                 const Vector6& extWrench = Vector6::Zero(), bool flatHorizontalGround = true);
+
+  const Eigen::Vector2d& getVRP() const { return vrp_; }  ///< Of the last computeNL() [m].
+  const Eigen::Vector2d& getNL() const { return nl_; }    ///< Of the last computeNL() [m].
+
+  /// Makes a contact known under a name, and active unless said otherwise. It is shared, not
+  /// copied: settings that change in the caller's hand act on the next call. A contact serves one
+  /// DynaCoM at a time, which sets its frame index, its pose and its force.
+  /// @throws std::invalid_argument if the contact is null, was never initialised or is known
+  ///         already, the name is taken, or the model does not have the contact's frame
+  void addContact(const std::shared_ptr<ContactBase>& contact, const std::string& name,
+                  bool active = true);
+  /// Forgets a contact; its force becomes zero.
+  /// @throws std::invalid_argument if the name is not known, as the next two
+  void removeContact(const std::string& name);
+  /// The contact takes part from now on, as the last one in order; does nothing if it does already.
+  void activateContact(const std::string& name);
+  /// The contact's force becomes zero, and it takes no part; does nothing if it takes none already.
+  void deactivateContact(const std::string& name);
+
+  /// The names that these functions had when there were 6D contacts only. They take any contact.
+  void addContact6d(const std::shared_ptr<ContactBase>& contact, const std::string& name,
+                    bool active = true) {
+    addContact(contact, name, active);
+  }
+  void removeContact6d(const std::string& name) { removeContact(name); }
+  void activateContact6d(const std::string& name) { activateContact(name); }
+  void deactivateContact6d(const std::string& name) { deactivateContact(name); }
+
+  /// @throws std::invalid_argument if the name is not known
+  const std::shared_ptr<ContactBase>& getContact(const std::string& name) const;
+  /// Names of the active contacts, in the order of their activation.
+  std::vector<std::string> getActiveContacts() const;
+  /// Names of all contacts: the active ones as above, then the others.
+  std::vector<std::string> getKnownContacts() const;
+
+  /// Shares a wrench between the active contacts, placed by getData(): the cheapest forces that
+  /// give it within all inequalities, equations (9–13). Each contact is given its force; unless
+  /// the status is DistributionStatus::Solved, that is zero.
+  /// @param groundCoMForce   [N]
+  /// @param groundCoMTorque  about the CoM [N·m]
+  /// @param com              position of the CoM [m]
+  DistributionStatus distributeForce(const Eigen::Vector3d& groundCoMForce,
+                                     const Eigen::Vector3d& groundCoMTorque,
+                                     const Eigen::Vector3d& com);
+  /// How the last distribution ended, be it distributeForce()'s or computeDynamics()'s own;
+  /// DistributionStatus::NoContact before the first.
+  DistributionStatus getDistributionStatus() const { return status_; }
+
+  /// Of the active contacts, stacked: block-diagonal U and C, their right-hand sides, the weights,
+  /// and the matrix NE (6 rows), as the contacts hold them now.
+  Eigen::MatrixXd uni_A() const;
+  Eigen::VectorXd uni_b() const;
+  Eigen::MatrixXd fri_A() const;
+  Eigen::VectorXd fri_b() const;
+  Eigen::VectorXd reg_A() const;
+  Eigen::VectorXd reg_b() const;
+  Eigen::MatrixXd ne_A() const;
+  /// The wrench (force, moment) about the CoM that the last distributeForce() was asked for.
+  const Vector6& ne_b() const { return ne_b_; }
+  /// The forces of the active contacts, stacked, each in its surface's frame.
+  Eigen::VectorXd allForces() const;
+
+ private:
+  // A copy has a contact of its own; a move keeps it.
+  struct Entry {
+    Entry(std::string name, std::shared_ptr<ContactBase> contact, bool active);
+    Entry(const Entry& other);
+    Entry(Entry&&) noexcept = default;
+    Entry& operator=(const Entry& other);
+    Entry& operator=(Entry&&) noexcept = default;
+
+    std::string name;
+    std::shared_ptr<ContactBase> contact;
+    bool active;
+  };
+
+  void setModel(pinocchio::Model&& model, DynaCoMSettings&& settings);
+  void forgetMotion();
+  void requireInitialized() const;
+  bool hasMotion() const;
+  std::vector<Entry>::const_iterator find(const std::string& name) const;
+  std::vector<Entry>::iterator find(const std::string& name);
+  std::vector<Entry>::iterator firstInactive();
+  pinocchio::FrameIndex findFrame(const ContactBase& contact) const;
+  void place(ContactBase& contact, const Eigen::Vector3d& com);
+  Eigen::Vector2d computePressureCentre() const;
+  template <class Rows, class Block>
+  Eigen::MatrixXd stackDiagonally(Rows rows, Block block) const;
+  template <class Block>
+  Eigen::VectorXd stack(Block block) const;
+
+  DynaCoMSettings settings_;
+  pinocchio::Model model_;
+  pinocchio::Data data_;
+  double mass_ = 0.;
+  double ground_height_ = 0.;
+
+  CentroidalState state_;
+  CentroidalWrench ground_wrench_;
+  Eigen::Vector2d cop_, vrp_, nl_;
+
+  std::vector<Entry> contacts_;  // the active ones first
+  WrenchDistribution distribution_;
+  Vector6 ne_b_;
+  DistributionStatus status_;
+};
+
+}  // namespace dynacom

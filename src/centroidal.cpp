@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/centroidal.hpp"
+
+#include <limits>
+#include <pinocchio/algorithm/centroidal.hpp>
+
+#include "check.hpp"
+
+namespace dynacom {
+
+CentroidalState computeCentroidalState(const pinocchio::Model& model, pinocchio::Data& data,
+                                       const Eigen::Ref<const Eigen::VectorXd>& q,
+                                       const Eigen::Ref<const Eigen::VectorXd>& v,
+                                       const Eigen::Ref<const Eigen::VectorXd>& a) {
+  internal::requireSize("q", q.size(), Eigen::Index(model.nq), "components (nq)");
+  internal::requireSize("v", v.size(), Eigen::Index(model.nv), "components (nv)");
+  internal::requireSize("a", a.size(), Eigen::Index(model.nv), "components (nv)");
+  pinocchio::computeCentroidalMomentumTimeVariation(model, data, q, v, a);
+  return readCentroidalState(data);
+}
+
+CentroidalState readCentroidalState(const pinocchio::Data& data) {
+  CentroidalState state;
+  state.mass = data.mass[0];
+  state.com = data.com[0];
+  state.vcom = data.vcom[0];
+  state.acom = data.dhg.linear() / state.mass;
+  state.am = data.hg.angular();
+  state.amVariation = data.dhg.angular();
+  return state;
+}
+
+CentroidalWrench computeGroundWrench(const CentroidalState& state, const Eigen::Vector3d& gravity,
+                                     const Eigen::Matrix<double, 6, 1>& extWrench) {
+  return {state.mass * (state.acom - gravity) - extWrench.head<3>(),  // (1)
+          state.amVariation - extWrench.tail<3>()};                   // (2)
+}
+
+Eigen::Vector2d computeFlatGroundCoP(const CentroidalWrench& groundWrench,
+                                     const Eigen::Vector3d& com, double groundHeight) {
+  const Eigen::Vector3d& f = groundWrench.force;
+  const Eigen::Vector3d& tau = groundWrench.torque;
+  if (!(f.z() >= kMinimalVerticalForce))
+    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  const Eigen::Vector2d s_tau(-tau.y(), tau.x());
+  return com.head<2>() + (s_tau - f.head<2>() * (com.z() - groundHeight)) / f.z();  // (5)
+}
+
+Eigen::Vector2d computeVRP(const CentroidalState& state, double omega) {
+  if (!(omega > 0.)) internal::throwInvalid("omega must be > 0 rad/s, got ", omega);
+  return state.com.head<2>() - state.acom.head<2>() / (omega * omega);  // (7)
+}
+
+}  // namespace dynacom

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/contact6d.hpp"
+
+#include <cmath>
+#include <ostream>
+
+#include "check.hpp"
+
+namespace dynacom {
+
+using internal::requireField;
+
+void Contact6DSettings::validate() const {
+  requireField(std::isfinite(mu) && mu >= 0., "Contact6DSettings.mu", "finite and >= 0", mu);
+  requireField(std::isfinite(gu) && gu >= 0., "Contact6DSettings.gu", "finite and >= 0", gu);
+  requireField(std::isfinite(half_length) && half_length >= 0., "Contact6DSettings.half_length",
+               "finite and >= 0", half_length);
+  requireField(std::isfinite(half_width) && half_width >= 0., "Contact6DSettings.half_width",
+               "finite and >= 0", half_width);
+  requireField(weights.allFinite() && (weights.array() > 0.).all(), "Contact6DSettings.weights",
+               "finite and > 0", weights.transpose());
+  requireField(!frame_name.empty(), "Contact6DSettings.frame_name", "a frame's name", "''");
+}
+
+std::string Contact6DSettings::to_string() const { return internal::concat(*this); }
+
+bool Contact6DSettings::operator==(const Contact6DSettings& other) const {
+  return mu == other.mu && gu == other.gu && half_length == other.half_length &&
+         half_width == other.half_width && weights == other.weights &&
+         frame_name == other.frame_name;
+}
+
+std::ostream& operator<<(std::ostream& out, const Contact6DSettings& settings) {
+  return out << "Contact6DSettings(mu=" << settings.mu << ", gu=" << settings.gu
+             << ", half_length=" << settings.half_length << ", half_width=" << settings.half_width
+             << ", weights=[" << settings.weights.transpose() << "], frame_name='"
+             << settings.frame_name << "')";
+}
+
+Contact6D::Contact6D(const Contact6DSettings& settings) { initialize(settings); }
+
+void Contact6D::initialize(const Contact6DSettings& settings) {
+  settings.validate();
+  reset(5, 6, 6);
+  updateSettings(settings);
+}
+
+std::shared_ptr<ContactBase> Contact6D::clone() const { return std::make_shared<Contact6D>(*this); }
+
+void Contact6D::setMu(double mu) {
+  Contact6DSettings settings = settings_;
+  settings.mu = mu;
+  updateSettings(settings);
+}
+
+void Contact6D::setGu(double gu) {
+  Contact6DSettings settings = settings_;
+  settings.gu = gu;
+  updateSettings(settings);
+}
+
+void Contact6D::setForceWeights(const Eigen::Vector3d& force_weights) {
+  Contact6DSettings settings = settings_;
+  settings.weights.head<3>() = force_weights;
+  updateSettings(settings);
+}
+
+void Contact6D::setTorqueWeights(const Eigen::Vector3d& torque_weights) {
+  Contact6DSettings settings = settings_;
+  settings.weights.tail<3>() = torque_weights;
+  updateSettings(settings);
+}
+
+void Contact6D::setSurfaceHalfWidth(double half_width) {
+  Contact6DSettings settings = settings_;
+  settings.half_width = half_width;
+  updateSettings(settings);
+}
+
+void Contact6D::setSurfaceHalfLength(double half_length) {
+  Contact6DSettings settings = settings_;
+  settings.half_length = half_length;
+  updateSettings(settings);
+}
+
+void Contact6D::updateSettings(const Contact6DSettings& settings) {
+  if (cols() == 0) throw NotReadyError("Contact6D is used before initialize()");
+  settings.validate();
+  settings_ = settings;
+  const double dx = settings_.half_length;
+  const double dy = settings_.half_width;
+  uni_A_ << 0., 0., -1., 0., 0., 0.,  //
+      0., 0., -dx, 0., -1., 0.,       //
+      0., 0., -dy, 1., 0., 0.,        //
+      0., 0., -dx, 0., 1., 0.,        //
+      0., 0., -dy, -1., 0., 0.;
+  const double mu = settings_.mu;
+  const double gu = settings_.gu;
+  fri_A_ << 1., 0., -mu, 0., 0., 0.,  //
+      0., 1., -mu, 0., 0., 0.,        //
+      -1., 0., -mu, 0., 0., 0.,       //
+      0., -1., -mu, 0., 0., 0.,       //
+      0., 0., -gu, 0., 0., 1.,        //
+      0., 0., -gu, 0., 0., -1.;
+  reg_A_ = settings_.weights;
+}
+
+}  // namespace dynacom

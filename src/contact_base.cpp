@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/contact_base.hpp"
+
+#include "check.hpp"
+
+namespace dynacom {
+
+void ContactBase::updateNewtonEuler(const Eigen::Vector3d& com, const SE3& oMs) {
+  pose_ = oMs;
+  if (cols() == 0) return;
+  const SE3 surface = getSurfacePose();
+  const Eigen::Vector3d lever = surface.translation() - com;
+  // The force adjoint from s to the frame at the CoM with the world's axes: [R 0; [p − c]×R R], of
+  // which a point has the three columns of the force.
+  ne_A_.topLeftCorner<3, 3>() = surface.rotation();
+  for (int axis = 0; axis < 3; ++axis)
+    ne_A_.col(axis).tail<3>() = lever.cross(surface.rotation().col(axis));
+  if (cols() == 6) ne_A_.bottomRightCorner<3, 3>() = surface.rotation();
+}
+
+void ContactBase::applyForce(const Eigen::Ref<const Eigen::VectorXd>& force) {
+  internal::requireSize("force", force.size(), cols(), "components");
+  force_ = force;
+}
+
+ContactBase::Vector6 ContactBase::toWorldForces() const {
+  pinocchio::Force wrench = pinocchio::Force::Zero();
+  wrench.toVector().head(cols()) = force_;
+  return getSurfacePose().act(wrench).toVector();
+}
+
+Eigen::Vector2d ContactBase::getCoP() const {
+  if (cols() == 0 || !(force_[2] > 0.))
+    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  if (cols() == 3) return Eigen::Vector2d::Zero();
+  return Eigen::Vector2d(-force_[4], force_[3]) / force_[2];
+}
+
+void ContactBase::reset(Eigen::Index uni_rows, Eigen::Index fri_rows, Eigen::Index cols) {
+  uni_A_.setZero(uni_rows, cols);
+  uni_b_.setZero(uni_rows);
+  fri_A_.setZero(fri_rows, cols);
+  fri_b_.setZero(fri_rows);
+  reg_A_.setZero(cols);
+  reg_b_.setZero(cols);
+  ne_A_.setZero(6, cols);
+  force_.setZero(cols);
+  frame_id_ = kUnknownFrame;
+}
+
+}  // namespace dynacom

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/contact_point.hpp"
+
+#include <cmath>
+#include <ostream>
+
+#include "check.hpp"
+
+namespace dynacom {
+
+using internal::requireField;
+
+void ContactPointSettings::validate() const {
+  requireField(std::isfinite(mu) && mu >= 0., "ContactPointSettings.mu", "finite and >= 0", mu);
+  requireField(weights.allFinite() && (weights.array() > 0.).all(), "ContactPointSettings.weights",
+               "finite and > 0", weights.transpose());
+  requireField(!frame_name.empty(), "ContactPointSettings.frame_name", "a frame's name", "''");
+  requireField(std::isfinite(radius) && radius >= 0., "ContactPointSettings.radius",
+               "finite and >= 0", radius);
+}
+
+std::string ContactPointSettings::to_string() const { return internal::concat(*this); }
+
+bool ContactPointSettings::operator==(const ContactPointSettings& other) const {
+  return mu == other.mu && weights == other.weights && frame_name == other.frame_name &&
+         world_aligned == other.world_aligned && radius == other.radius;
+}
+
+std::ostream& operator<<(std::ostream& out, const ContactPointSettings& settings) {
+  return out << "ContactPointSettings(mu=" << settings.mu << ", weights=["
+             << settings.weights.transpose() << "], frame_name='" << settings.frame_name
+             << "', world_aligned=" << (settings.world_aligned ? "true" : "false")
+             << ", radius=" << settings.radius << ")";
+}
+
+ContactPoint::ContactPoint(const ContactPointSettings& settings) { initialize(settings); }
+
+void ContactPoint::initialize(const ContactPointSettings& settings) {
+  settings.validate();
+  reset(1, 4, 3);
+  updateSettings(settings);
+}
+
+std::shared_ptr<ContactBase> ContactPoint::clone() const {
+  return std::make_shared<ContactPoint>(*this);
+}
+
+ContactBase::SE3 ContactPoint::getSurfacePose() const {
+  SE3 surface = getPose();
+  if (settings_.world_aligned) surface.rotation().setIdentity();
+  surface.translation() -= settings_.radius * surface.rotation().col(2);
+  return surface;
+}
+
+void ContactPoint::setMu(double mu) {
+  ContactPointSettings settings = settings_;
+  settings.mu = mu;
+  updateSettings(settings);
+}
+
+void ContactPoint::setForceWeights(const Eigen::Vector3d& force_weights) {
+  ContactPointSettings settings = settings_;
+  settings.weights = force_weights;
+  updateSettings(settings);
+}
+
+void ContactPoint::updateSettings(const ContactPointSettings& settings) {
+  if (cols() == 0) throw NotReadyError("ContactPoint is used before initialize()");
+  settings.validate();
+  settings_ = settings;
+  const double mu = settings_.mu;
+  uni_A_ << 0., 0., -1.;
+  fri_A_ << 1., 0., -mu,  //
+      0., 1., -mu,        //
+      -1., 0., -mu,       //
+      0., -1., -mu;
+  reg_A_ = settings_.weights;
+}
+
+}  // namespace dynacom

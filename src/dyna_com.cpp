@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/dyna_com.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <ostream>
+#include <pinocchio/algorithm/center-of-mass.hpp>
+#include <pinocchio/algorithm/frames.hpp>
+#include <utility>
+
+#include "check.hpp"
+#include "urdf.hpp"
+
+namespace dynacom {
+
+using internal::throwInvalid;
+
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+void DynaCoMSettings::validate() const {
+  internal::requireField(gravity.allFinite() && gravity.x() == 0. && gravity.y() == 0. &&
+                             gravity.z() <= 0.,
+                         "DynaCoMSettings.gravity", "along -z or zero", gravity.transpose());
+}
+
+std::string DynaCoMSettings::to_string() const { return internal::concat(*this); }
+
+bool DynaCoMSettings::operator==(const DynaCoMSettings& other) const {
+  return urdf == other.urdf && gravity == other.gravity;
+}
+
+std::ostream& operator<<(std::ostream& out, const DynaCoMSettings& settings) {
+  return out << "DynaCoMSettings(urdf='" << settings.urdf << "', gravity=["
+             << settings.gravity.transpose() << "])";
+}
+
+DynaCoM::Entry::Entry(std::string name, std::shared_ptr<ContactBase> contact, bool active)
+    : name(std::move(name)), contact(std::move(contact)), active(active) {}
+
+DynaCoM::Entry::Entry(const Entry& other)
+    : Entry(other.name, other.contact->clone(), other.active) {}
+
+DynaCoM::Entry& DynaCoM::Entry::operator=(const Entry& other) { return *this = Entry(other); }
+
+DynaCoM::DynaCoM() { forgetMotion(); }
+DynaCoM::DynaCoM(const DynaCoMSettings& settings) { initialize(settings); }
+DynaCoM::DynaCoM(const pinocchio::Model& model) { initialize(model); }
+
+void DynaCoM::initialize(const DynaCoMSettings& settings) {
+  settings.validate();
+  pinocchio::Model model = internal::readUrdf(settings.urdf);
+  model.gravity.linear() = settings.gravity;
+  setModel(std::move(model), DynaCoMSettings(settings));
+}
+
+void DynaCoM::initialize(const pinocchio::Model& model) {
+  DynaCoMSettings settings;
+  settings.gravity = model.gravity.linear();
+  settings.validate();
+  setModel(pinocchio::Model(model), std::move(settings));
+}
+
+void DynaCoM::setModel(pinocchio::Model&& model, DynaCoMSettings&& settings) {
+  const double mass = pinocchio::computeTotalMass(model);
+  if (!(mass > 0.)) throwInvalid("the robot '", model.name, "' must have a mass > 0, got ", mass);
+  pinocchio::Data data(model);
+  for (Entry& entry : contacts_) entry.contact->deactivate();
+  contacts_.clear();
+  settings_ = std::move(settings);
+  model_ = std::move(model);
+  data_ = std::move(data);
+  mass_ = mass;
+  forgetMotion();
+}
+
+// Sets all numbers of the motion to NaN, as before the first computeDynamics().
+void DynaCoM::forgetMotion() {
+  const Eigen::Vector3d nan = Eigen::Vector3d::Constant(kNaN);
+  state_ = {kNaN, nan, nan, nan, nan, nan};
+  ground_wrench_ = {nan, nan};
+  cop_ = vrp_ = nl_ = nan.head<2>();
+  ne_b_.setConstant(kNaN);
+  status_ = DistributionStatus::NoContact;
+}
+
+void DynaCoM::requireInitialized() const {
+  if (mass_ == 0.) throw NotReadyError("DynaCoM is used before initialize()");
+}
+
+bool DynaCoM::hasMotion() const { return !std::isnan(state_.mass); }
+
+void DynaCoM::setGroundHeight(double groundHeight) {
+  if (!std::isfinite(groundHeight)) throwInvalid("groundHeight must be finite, got ", groundHeight);
+  ground_height_ = groundHeight;
+}
+
+void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                              const Vector6& extWrench, bool flatHorizontalGround) {
+  requireInitialized();
+  state_ = computeCentroidalState(model_, data_, q, v, a);
+  ground_wrench_ = computeGroundWrench(state_, settings_.gravity, extWrench);
+  for (const Entry& entry : contacts_) place(*entry.contact, state_.com);
+
+  if (flatHorizontalGround) {
+    cop_ = computeFlatGroundCoP(ground_wrench_, state_.com, ground_height_);
+  } else {
+    distributeForce(ground_wrench_.force, ground_wrench_.torque, state_.com);
+    cop_ = computePressureCentre();
+  }
+}
+
+void DynaCoM::computeNL(double omega) {
+  requireInitialized();
+  if (!hasMotion()) throw NotReadyError("DynaCoM::computeNL needs computeDynamics() before");
+  vrp_ = computeVRP(state_, omega);
+  nl_ = cop_ - vrp_;  // (8)
+}
+
+void DynaCoM::computeNL(double omega, const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                        const Vector6& extWrench, bool flatHorizontalGround) {
+  computeDynamics(q, v, a, extWrench, flatHorizontalGround);
+  computeNL(omega);
+}
+
+void DynaCoM::addContact(const std::shared_ptr<ContactBase>& contact, const std::string& name,
+                         bool active) {
+  requireInitialized();
+  if (!contact) throwInvalid("contact '", name, "' must not be null");
+  if (contact->cols() == 0) throwInvalid("contact '", name, "' was never initialised");
+  for (const Entry& entry : contacts_) {
+    if (entry.name == name) throwInvalid("there is a contact '", name, "' already");
+    if (entry.contact == contact)
+      throwInvalid("contact '", name, "' is known already, as '", entry.name, "'");
+  }
+  // Whatever index the contact holds may be another model's.
+  if (!model_.existFrame(contact->getFrameName()))
+    throwInvalid("contact '", name, "': the model has no frame '", contact->getFrameName(), "'");
+  contacts_.emplace_back(name, contact, false);
+  contact->setFrameID(model_.getFrameId(contact->getFrameName()));
+  contact->deactivate();
+  if (hasMotion()) place(*contact, state_.com);
+  if (active) activateContact(name);
+}
+
+void DynaCoM::removeContact(const std::string& name) {
+  const auto entry = find(name);
+  entry->contact->deactivate();
+  contacts_.erase(entry);
+}
+
+void DynaCoM::activateContact(const std::string& name) {
+  const auto entry = find(name);
+  if (entry->active) return;
+  if (hasMotion()) place(*entry->contact, state_.com);
+  entry->active = true;
+  std::rotate(firstInactive(), entry, entry + 1);
+}
+
+void DynaCoM::deactivateContact(const std::string& name) {
+  const auto entry = find(name);
+  if (!entry->active) return;
+  const auto end_of_active = firstInactive();
+  entry->active = false;
+  entry->contact->deactivate();
+  std::rotate(entry, entry + 1, end_of_active);
+}
+
+std::vector<DynaCoM::Entry>::const_iterator DynaCoM::find(const std::string& name) const {
+  const auto entry = std::find_if(contacts_.begin(), contacts_.end(),
+                                  [&](const Entry& entry) { return entry.name == name; });
+  if (entry == contacts_.end()) {
+    std::string known;
+    for (const Entry& entry : contacts_) known += (known.empty() ? "'" : ", '") + entry.name + "'";
+    throwInvalid("there is no contact '", name, "'; known: ", known.empty() ? "none" : known);
+  }
+  return entry;
+}
+
+std::vector<DynaCoM::Entry>::iterator DynaCoM::find(const std::string& name) {
+  return contacts_.begin() + (std::as_const(*this).find(name) - contacts_.cbegin());
+}
+
+std::vector<DynaCoM::Entry>::iterator DynaCoM::firstInactive() {
+  return std::find_if(contacts_.begin(), contacts_.end(),
+                      [](const Entry& entry) { return !entry.active; });
+}
+
+// The contact's frame in the model. Contacts that were initialised again have forgotten theirs.
+pinocchio::FrameIndex DynaCoM::findFrame(const ContactBase& contact) const {
+  if (contact.getFrameID() < model_.frames.size()) return contact.getFrameID();
+  if (!model_.existFrame(contact.getFrameName()))
+    throwInvalid("the model has no frame '", contact.getFrameName(), "' for a contact");
+  return model_.getFrameId(contact.getFrameName());
+}
+
+// Places a contact where its frame is. By oMi, which every kinematic algorithm of Pinocchio leaves
+// in data.
+void DynaCoM::place(ContactBase& contact, const Eigen::Vector3d& com) {
+  contact.setFrameID(findFrame(contact));
+  contact.updateNewtonEuler(
+      com, pinocchio::updateFramePlacement(model_, data_, contact.getFrameID()));
+}
+
+const std::shared_ptr<ContactBase>& DynaCoM::getContact(const std::string& name) const {
+  return find(name)->contact;
+}
+
+std::vector<std::string> DynaCoM::getActiveContacts() const {
+  std::vector<std::string> names;
+  for (const Entry& entry : contacts_)
+    if (entry.active) names.push_back(entry.name);
+  return names;
+}
+
+std::vector<std::string> DynaCoM::getKnownContacts() const {
+  std::vector<std::string> names;
+  for (const Entry& entry : contacts_) names.push_back(entry.name);
+  return names;
+}
+
+DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForce,
+                                            const Eigen::Vector3d& groundCoMTorque,
+                                            const Eigen::Vector3d& com) {
+  requireInitialized();
+  distribution_.clear();
+  for (const Entry& entry : contacts_) {
+    if (!entry.active) break;
+    place(*entry.contact, com);
+    distribution_.add(*entry.contact);
+  }
+  ne_b_ << groundCoMForce, groundCoMTorque;
+  status_ = distribution_.solve(ne_b_);
+
+  Eigen::Index col = 0;
+  for (const Entry& entry : contacts_) {
+    if (!entry.active) break;
+    const Eigen::Index cols = entry.contact->cols();
+    entry.contact->applyForce(distribution_.forces().segment(col, cols));
+    col += cols;
+  }
+  return status_;
+}
+
+// Equation (6), with each contact's own centre of pressure p_k in the world: S (p × F ẑ) = F p, so
+// that this is the mean of the p_k, weighted by the vertical forces.
+Eigen::Vector2d DynaCoM::computePressureCentre() const {
+  Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+  double vertical_force = 0.;
+  for (const Entry& entry : contacts_) {
+    if (!entry.active) break;
+    const Eigen::Vector2d cop = entry.contact->getCoP();
+    if (!cop.allFinite()) continue;
+    const pinocchio::SE3 surface = entry.contact->getSurfacePose();
+    const double force = surface.rotation().row(2).dot(entry.contact->appliedForce().head<3>());
+    moment += force * surface.act(Eigen::Vector3d(cop.x(), cop.y(), 0.)).head<2>();
+    vertical_force += force;
+  }
+  if (!(vertical_force >= kMinimalVerticalForce)) return Eigen::Vector2d::Constant(kNaN);
+  return moment / vertical_force;
+}
+
+template <class Rows, class Block>
+Eigen::MatrixXd DynaCoM::stackDiagonally(Rows rows, Block block) const {
+  Eigen::Index all_rows = 0, all_cols = 0;
+  for (const Entry& entry : contacts_) {
+    if (!entry.active) break;
+    all_rows += ((*entry.contact).*rows)();
+    all_cols += entry.contact->cols();
+  }
+  Eigen::MatrixXd stacked = Eigen::MatrixXd::Zero(all_rows, all_cols);
+  Eigen::Index row = 0, col = 0;
+  for (const Entry& entry : contacts_) {
+    if (!entry.active) break;
+    const Eigen::MatrixXd& matrix = ((*entry.contact).*block)();
+    stacked.block(row, col, matrix.rows(), matrix.cols()) = matrix;
+    row += matrix.rows();
+    col += matrix.cols();
+  }
+  return stacked;
+}
+
+template <class Block>
+Eigen::VectorXd DynaCoM::stack(Block block) const {
+  Eigen::VectorXd stacked(0);
+  for (const Entry& entry : contacts_) {
+    if (!entry.active) break;
+    const Eigen::VectorXd& vector = ((*entry.contact).*block)();
+    stacked.conservativeResize(stacked.size() + vector.size());
+    stacked.tail(vector.size()) = vector;
+  }
+  return stacked;
+}
+
+Eigen::MatrixXd DynaCoM::uni_A() const {
+  return stackDiagonally(&ContactBase::uni_rows, &ContactBase::uni_A);
+}
+Eigen::VectorXd DynaCoM::uni_b() const { return stack(&ContactBase::uni_b); }
+Eigen::MatrixXd DynaCoM::fri_A() const {
+  return stackDiagonally(&ContactBase::fri_rows, &ContactBase::fri_A);
+}
+Eigen::VectorXd DynaCoM::fri_b() const { return stack(&ContactBase::fri_b); }
+Eigen::VectorXd DynaCoM::reg_A() const { return stack(&ContactBase::reg_A); }
+Eigen::VectorXd DynaCoM::reg_b() const { return stack(&ContactBase::reg_b); }
+Eigen::VectorXd DynaCoM::allForces() const { return stack(&ContactBase::appliedForce); }
+
+Eigen::MatrixXd DynaCoM::ne_A() const {
+  Eigen::MatrixXd stacked(6, 0);
+  for (const Entry& entry : contacts_) {
+    if (!entry.active) break;
+    stacked.conservativeResize(6, stacked.cols() + entry.contact->cols());
+    stacked.rightCols(entry.contact->cols()) = entry.contact->ne_A();
+  }
+  return stacked;
+}
+
+}  // namespace dynacom

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "check.hpp"
+
+namespace dynacom {
+
+using internal::throwInvalid;
+
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// How many frames pass between two calls of AnalysisSettings::progress.
+constexpr Eigen::Index kProgressFrames = 256;
+
+void requireFrames(const char* name, const Eigen::MatrixXd& values, Eigen::Index size,
+                   const char* unit, Eigen::Index frames) {
+  internal::requireSize(name, values.rows(), size, unit);
+  internal::requireSize(name, values.cols(), frames, "frames");
+  for (Eigen::Index frame = 0; frame < frames; ++frame)
+    if (!values.col(frame).allFinite())
+      throwInvalid(name, " must be finite, got another number in frame ", frame);
+}
+
+// √(g / mean height of the CoM above the ground), the natural frequency of the pendulum.
+double computeOmega(const Eigen::Matrix3Xd& com, double gravity, double ground_height) {
+  const double height = com.row(2).mean() - ground_height;
+  const double omega = std::sqrt(gravity / height);
+  return omega > 0. && std::isfinite(omega) ? omega : kNaN;
+}
+
+}  // namespace
+
+void Motion::validate(const pinocchio::Model& model) const {
+  if (frames() == 0) throwInvalid("time must have at least one frame, got 0");
+  for (Eigen::Index frame = 0; frame < frames(); ++frame) {
+    if (!std::isfinite(time[frame]))
+      throwInvalid("time must be finite, got ", time[frame], " in frame ", frame);
+    if (frame > 0 && !(time[frame] > time[frame - 1]))
+      throwInvalid("time must increase, got ", time[frame - 1], " s and then ", time[frame],
+                   " s in frame ", frame);
+  }
+  requireFrames("q", q, model.nq, "components (nq)", frames());
+  requireFrames("v", v, model.nv, "components (nv)", frames());
+  requireFrames("a", a, model.nv, "components (nv)", frames());
+}
+
+void ContactSchedule::validate(Eigen::Index frames) const {
+  for (auto name = names.begin(); name != names.end(); ++name)
+    if (std::find(names.begin(), name, *name) != name)
+      throwInvalid("the schedule names the contact '", *name, "' twice");
+  internal::requireSize("active", active.rows(), Eigen::Index(names.size()), "contacts");
+  internal::requireSize("active", active.cols(), frames, "frames");
+}
+
+MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
+                             const ContactSchedule& schedule, const AnalysisSettings& settings) {
+  const Eigen::Index frames = motion.frames();
+  motion.validate(robot.getModel());
+  schedule.validate(frames);
+  if (!(settings.omega >= 0.)) throwInvalid("omega must be >= 0 rad/s, got ", settings.omega);
+
+  DynaCoM worker(robot);
+  MotionAnalysis result;
+  for (const std::string& name : schedule.names) worker.getContact(name);
+  std::vector<std::shared_ptr<const ContactBase>> contacts;
+  for (const std::string& name : worker.getKnownContacts()) {
+    worker.deactivateContact(name);
+    contacts.push_back(worker.getContact(name));
+    result.contacts.push_back({name, Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, false),
+                               Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, frames),
+                               Eigen::VectorXd::Zero(frames)});
+  }
+  result.time = motion.time;
+  for (Eigen::Matrix3Xd* values : {&result.com, &result.vcom, &result.acom, &result.am, &result.dam,
+                                   &result.ground_force, &result.ground_torque})
+    values->resize(3, frames);
+  for (Eigen::Matrix2Xd* values : {&result.cop, &result.vrp, &result.nl})
+    values->setConstant(2, frames, kNaN);
+  result.status.resize(frames);
+  result.residual.resize(6, frames);
+
+  for (Eigen::Index frame = 0; frame < frames; ++frame) {
+    for (std::size_t k = 0; k < schedule.names.size(); ++k) {
+      if (schedule.active(k, frame))
+        worker.activateContact(schedule.names[k]);
+      else
+        worker.deactivateContact(schedule.names[k]);
+    }
+    worker.computeDynamics(motion.q.col(frame), motion.v.col(frame), motion.a.col(frame),
+                           DynaCoM::Vector6::Zero(), settings.flat_horizontal_ground);
+    result.com.col(frame) = worker.getCoM();
+    result.vcom.col(frame) = worker.getVCoM();
+    result.acom.col(frame) = worker.getACoM();
+    result.am.col(frame) = worker.getAM();
+    result.dam.col(frame) = worker.getAMVariation();
+    result.ground_force.col(frame) = worker.getGroundCoMForce();
+    result.ground_torque.col(frame) = worker.getGroundCoMTorque();
+    result.cop.col(frame) = worker.getCoP();
+
+    // On uneven ground the centre of pressure needed the distribution already.
+    if (settings.flat_horizontal_ground)
+      worker.distributeForce(worker.getGroundCoMForce(), worker.getGroundCoMTorque(),
+                             worker.getCoM());
+    result.status[frame] = worker.getDistributionStatus();
+    result.residual.col(frame) = worker.ne_b();
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      const ContactBase& contact = *contacts[k];
+      result.contacts[k].wrench.col(frame).head(contact.cols()) = contact.appliedForce();
+      result.contacts[k].vertical_force[frame] = contact.toCoMForces().z();
+      result.residual.col(frame) -= contact.toCoMForces();
+    }
+    if (settings.progress && (frame + 1) % kProgressFrames == 0) settings.progress(frame + 1);
+  }
+  for (std::size_t k = 0; k < schedule.names.size(); ++k)
+    for (MotionAnalysis::Contact& contact : result.contacts)
+      if (contact.name == schedule.names[k]) contact.active = schedule.active.row(k).transpose();
+
+  result.omega = settings.omega;
+  if (result.omega == 0.)
+    result.omega = computeOmega(result.com, -robot.getSettings().gravity.z(),
+                                robot.getGroundHeight());
+  if (!std::isnan(result.omega)) {
+    // (7, 8)
+    result.vrp = result.com.topRows<2>() - result.acom.topRows<2>() / std::pow(result.omega, 2);
+    result.nl = result.cop - result.vrp;
+  }
+  if (settings.progress) settings.progress(frames);
+  return result;
+}
+
+}  // namespace dynacom
