@@ -157,8 +157,9 @@ void DynaCoM::activateContact(const std::string& name) {
   const auto entry = find(name);
   if (entry->active) return;
   if (hasMotion()) place(*entry->contact, state_.com);
+  const auto end_of_active = firstInactive();
   entry->active = true;
-  std::rotate(firstInactive(), entry, entry + 1);
+  std::rotate(end_of_active, entry, entry + 1);
 }
 
 void DynaCoM::deactivateContact(const std::string& name) {
