@@ -7,8 +7,8 @@ write them again, give crocoddyl an environment of its own::
     croc/bin/pip install crocoddyl==3.2.1 pin==4.0.0
     croc/bin/python examples/make_walks.py --robots ROBOTS
 
-The wheel of crocoddyl 3.2.1 was built against pin 4.0 and does not load next to pin 4.1: ask for
-both versions as above, and do not share the environment with a newer pin. ``ROBOTS`` is the folder
+The wheel of crocoddyl 3.2.1 was built against pin 4.0 and is not ABI-compatible with pin 4.1: ask
+for both versions as above, and for nothing that needs a newer pin. ``ROBOTS`` is the folder
 ``cmeel.prefix/share/example-robot-data/robots`` of the PyPI package ``example-robot-data`` 6.0.0;
 without ``--robots`` the one on ``sys.path`` is taken (crocoddyl brings that of 5.0.0, where the
 URDFs and SRDFs of these two robots are the same).
@@ -49,11 +49,15 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
+
+# Before crocoddyl is loaded: on a busy machine its threads wait for each other most of the time.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import crocoddyl
 import numpy as np
@@ -342,7 +346,7 @@ def solve(
 ) -> crocoddyl.SolverFDDP:
     """Solve for the motion over ``knots`` from ``xs[0]``; the last knot has no duration."""
     shooting = crocoddyl.ShootingProblem(xs[0], knots[:-1], knots[-1])
-    shooting.nthreads = 1  # to have the same sums on every machine
+    shooting.nthreads = 1
     solver = crocoddyl.SolverFDDP(shooting)
     solver.th_stop = 1e-7
     if us is None:

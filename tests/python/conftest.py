@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-2-Clause
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import dynacom
+import numpy as np
+import pinocchio as pin
+import pytest
+from dynacom.robots import Robot
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The repository."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def talos() -> Robot:
+    return dynacom.load_robot("talos")
+
+
+@pytest.fixture(scope="session")
+def anymal() -> Robot:
+    return dynacom.load_robot("anymal_c")
+
+
+def put_on_ground(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """q, moved along z so that the lowest contact touches the ground (z = 0)."""
+    dynamics = robot.dynacom()
+    zero = np.zeros(robot.model.nv)
+    dynamics.computeDynamics(q, zero, zero)
+    lowest = min(
+        dynamics.getContact(name).getSurfacePose().translation[2] for name in robot.contacts
+    )
+    q = q.copy()
+    q[2] -= lowest
+    return q
+
+
+@pytest.fixture(scope="session")
+def talos_standing(talos: Robot) -> np.ndarray:
+    """Knees bent, feet side by side on the ground."""
+    model = talos.model
+    q = pin.neutral(model)
+    for side in ("left", "right"):
+        for joint, angle in (("3", -0.45), ("4", 0.9), ("5", -0.45)):
+            q[model.idx_qs[model.getJointId(f"leg_{side}_{joint}_joint")]] = angle
+    return put_on_ground(talos, q)
+
+
+@pytest.fixture(scope="session")
+def anymal_standing(anymal: Robot) -> np.ndarray:
+    """Legs bent, feet on the ground: the URDF's SRDF calls it `standing`."""
+    model = anymal.model
+    q = pin.neutral(model)
+    for front, sign in (("F", 1.0), ("H", -1.0)):
+        for side, roll in (("L", -0.1), ("R", 0.1)):
+            for joint, angle in (("HAA", roll), ("HFE", 0.7 * sign), ("KFE", -1.0 * sign)):
+                q[model.idx_qs[model.getJointId(f"{side}{front}_{joint}")]] = angle
+    return put_on_ground(anymal, q)
+
+
+Motion = dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="session")
+def talos_motion(talos: Robot, talos_standing: np.ndarray) -> Motion:
+    """The arrays of a motion file: Talos on two feet, on one, on none; at last it falls freely."""
+    rng = np.random.default_rng(0)
+    frames, nv = 40, talos.model.nv
+    time = np.linspace(0.0, 0.78, frames)
+    v = 0.02 * rng.standard_normal((frames, nv))
+    a = 0.05 * rng.standard_normal((frames, nv))
+    q = np.array([pin.integrate(talos.model, talos_standing, 0.02 * v_t) for v_t in v])
+    q[-1], v[-1], a[-1] = talos_standing, 0.0, 0.0
+    a[-1, 2] = -9.81
+    contacts = np.ones((frames, 2), dtype=bool)
+    contacts[25:30, 1] = False
+    contacts[30:] = False
+    names = np.array(["left_sole", "right_sole"])
+    return {"t": time, "q": q, "v": v, "a": a, "contacts": contacts, "contact_names": names}
+
+
+@pytest.fixture
+def motion_file(tmp_path: Path, talos_motion: Motion) -> Callable[..., Path]:
+    """Writes that motion to a file: with arrays replaced or added, or dropped where None."""
+
+    def write(name: str = "motion.npz", **changes: np.ndarray | None) -> Path:
+        path = tmp_path / name
+        arrays = talos_motion | changes
+        np.savez(path, **{key: value for key, value in arrays.items() if value is not None})
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def run() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Runs the command as a user does, in a process of its own."""
+
+    def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "dynacom", *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            env=os.environ | {"COLUMNS": "120"},
+            **options,
+        )
+
+    return run

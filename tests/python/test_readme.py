@@ -1,0 +1,59 @@
+"""README is true: every block of code in it runs. The C++ block is a test of ctest's."""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", (ROOT / "README.md").read_text(), re.M | re.S)
+
+
+def blocks(language):
+    return [text for kind, text in BLOCKS if kind == language]
+
+
+def commands():
+    """Every command of the shell blocks, without its comment; a line depends on none before it."""
+    for text in blocks("bash"):
+        for line in text.splitlines():
+            if command := line.split(" #")[0].strip():
+                yield command
+
+
+def test_every_block_is_tested():
+    assert {kind for kind, _ in BLOCKS} == {"bash", "python", "cpp", "cmake"}
+    assert len(blocks("cpp")) == 1  # tests/CMakeLists.txt takes the first
+
+
+@pytest.mark.parametrize("code", blocks("python"))
+def test_python(code, capsys):
+    exec(compile(code, "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "Solved" in printed
+    assert "left_sole" in printed and "right_sole" in printed
+
+
+def test_cmake():
+    (code,) = blocks("cmake")
+    consumer = (ROOT / "tests/wheel/consumer/CMakeLists.txt").read_text()
+    package, link = code.splitlines()
+    assert package in consumer
+    assert re.search(re.escape(link).replace("main", r"\w+"), consumer)
+
+
+@pytest.mark.parametrize("command", commands())
+def test_command(command, tmp_path):
+    if command == "scripts/test":
+        # This runs in it; so does CI.
+        assert "scripts/test" in (ROOT / ".ci/run").read_text()
+        return
+    # What is written goes to a folder of the test's, so paths of the project become absolute.
+    absolute = re.sub(r"(?<![\w/.])(\.venv|scripts|examples)/", rf"{ROOT}/\1/", command)
+    environment = dict(os.environ, PATH=f"{ROOT}/.venv/bin:{os.environ['PATH']}")
+    done = subprocess.run(
+        ["bash", "-ec", absolute], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
