@@ -2,6 +2,7 @@
 #pragma once
 
 #include <eigenpy/eigenpy.hpp>
+#include <utility>
 
 // What the bindings have in common. Vectors and matrices come in as any numpy array of numbers and
 // go out as copies; errors of C++ become those of Python, see module.cpp.
@@ -20,13 +21,27 @@ void exposeMotion();
 
 /// A property that hands out a copy of a member, and takes one if it may be written.
 template <class Class, class Value>
-bp::object getter(Value Class::* member) {
+bp::object getter(Value Class::*member) {
   return bp::make_getter(member, bp::return_value_policy<bp::return_by_value>());
 }
 template <class Class, class Value>
-bp::object setter(Value Class::* member) {
+bp::object setter(Value Class::*member) {
   return bp::make_setter(member, bp::default_call_policies());
 }
+
+/// A matrix as an array with two dimensions: a matrix of one row or column would have only one.
+template <class Derived>
+bp::object toArray(const Eigen::MatrixBase<Derived>& matrix) {
+  return bp::object(matrix.eval()).attr("reshape")(matrix.rows(), matrix.cols());
+}
+
+/// A method that returns a matrix.
+template <class Class, class Result, Result (Class::*method)() const>
+bp::object callForArray(const Class& self) {
+  return toArray((self.*method)());
+}
+#define DYNACOM_MATRIX(Class, method) \
+  &callForArray<Class, decltype(std::declval<const Class&>().method()), &Class::method>
 
 /// For methods that return a reference: Python gets a copy.
 using Copied = bp::return_value_policy<bp::copy_const_reference>;

@@ -21,9 +21,8 @@ void exposeCentroidal() {
       .add_property("amVariation", getter(&CentroidalState::amVariation),
                     setter(&CentroidalState::amVariation), "dL/dt, (3,) [N·m]");
 
-  bp::class_<CentroidalWrench>("CentroidalWrench",
-                               "A wrench about the centre of mass, in the world's axes.",
-                               bp::init<>())
+  bp::class_<CentroidalWrench>(
+      "CentroidalWrench", "A wrench about the centre of mass, in the world's axes.", bp::init<>())
       .add_property("force", getter(&CentroidalWrench::force), setter(&CentroidalWrench::force),
                     "f, (3,) [N]")
       .add_property("torque", getter(&CentroidalWrench::torque), setter(&CentroidalWrench::torque),

@@ -16,7 +16,8 @@ void exposeContactBase() {
   bp::class_<ContactBase, std::shared_ptr<ContactBase>, boost::noncopyable>(
       "ContactBase",
       "What every contact is: a frame of the robot, through which the environment gives the robot\n"
-      "a force lambda, limited by linear inequalities. lambda is expressed in the surface's frame,\n"
+      "a force lambda, limited by linear inequalities. lambda is expressed in the surface's "
+      "frame,\n"
       "z along the normal, into the robot: force [N], then, for surfaces, moment [N·m].\n\n"
       "|f_x|, |f_y| <= mu f_z is a pyramid around the friction cone: on its diagonals it allows\n"
       "sqrt(2) mu f_z.",
@@ -38,16 +39,16 @@ void exposeContactBase() {
       .def("uni_rows", &ContactBase::uni_rows, bp::arg("self"), "Rows of uni_A.")
       .def("fri_rows", &ContactBase::fri_rows, bp::arg("self"), "Rows of fri_A.")
       .def("cols", &ContactBase::cols, bp::arg("self"), "Components of lambda: 3 or 6.")
-      .def("uni_A", &ContactBase::uni_A, bp::arg("self"), Copied(),
+      .def("uni_A", DYNACOM_MATRIX(ContactBase, uni_A), bp::arg("self"),
            "Unilaterality: uni_A lambda <= uni_b, (uni_rows, cols).")
       .def("uni_b", &ContactBase::uni_b, bp::arg("self"), Copied(), "Zero, (uni_rows,).")
-      .def("fri_A", &ContactBase::fri_A, bp::arg("self"), Copied(),
+      .def("fri_A", DYNACOM_MATRIX(ContactBase, fri_A), bp::arg("self"),
            "Friction: fri_A lambda <= fri_b, (fri_rows, cols).")
       .def("fri_b", &ContactBase::fri_b, bp::arg("self"), Copied(), "Zero, (fri_rows,).")
       .def("reg_A", &ContactBase::reg_A, bp::arg("self"), Copied(),
            "Weights of lambda in the cost, which squares them, (cols,).")
       .def("reg_b", &ContactBase::reg_b, bp::arg("self"), Copied(), "Zero, (cols,).")
-      .def("ne_A", &ContactBase::ne_A, bp::arg("self"), Copied(),
+      .def("ne_A", DYNACOM_MATRIX(ContactBase, ne_A), bp::arg("self"),
            "Newton-Euler matrix, (6, cols): takes lambda to (force, moment) about the centre of\n"
            "mass in the world's axes, at the last updateNewtonEuler.")
       .def("updateNewtonEuler", &ContactBase::updateNewtonEuler,

@@ -46,7 +46,8 @@ void exposeDynaCoM() {
                                              "Raises ValueError as initialize()."))
       .def<void (DynaCoM::*)(const Settings&)>(
           "initialize", &DynaCoM::initialize, (bp::arg("self"), bp::arg("settings")),
-          "Reads the robot and forgets the contacts; may be called again. Raises ValueError if the\n"
+          "Reads the robot and forgets the contacts; may be called again. Raises ValueError if "
+          "the\n"
           "settings are not valid, the URDF cannot be read or the robot has no mass; nothing has\n"
           "changed then.")
       .def<void (DynaCoM::*)(const pinocchio::Model&)>(
@@ -101,10 +102,11 @@ void exposeDynaCoM() {
            "Virtual repellent point, (2,) [m].")
       .def("getNL", &DynaCoM::getNL, bp::arg("self"), Copied(), "Non-linearity p - v, (2,) [m].")
 
-      .def("addContact", &DynaCoM::addContact,
-           (bp::arg("self"), bp::arg("contact"), bp::arg("name"), bp::arg("active") = true),
-           "Makes a contact known under a name. It is shared, not copied. Raises ValueError if the\n"
-           "name is taken, the contact known or not initialised, or its frame not in the model.")
+      .def(
+          "addContact", &DynaCoM::addContact,
+          (bp::arg("self"), bp::arg("contact"), bp::arg("name"), bp::arg("active") = true),
+          "Makes a contact known under a name. It is shared, not copied. Raises ValueError if the\n"
+          "name is taken, the contact known or not initialised, or its frame not in the model.")
       .def("removeContact", &DynaCoM::removeContact, (bp::arg("self"), bp::arg("name")),
            "Forgets a contact. Raises ValueError if the name is not known.")
       .def("activateContact", &DynaCoM::activateContact, (bp::arg("self"), bp::arg("name")),
@@ -138,15 +140,15 @@ void exposeDynaCoM() {
            "com: (3,) [m].")
       .def("getDistributionStatus", &DynaCoM::getDistributionStatus, bp::arg("self"),
            "How the last distribution ended.")
-      .def("uni_A", &DynaCoM::uni_A, bp::arg("self"),
+      .def("uni_A", DYNACOM_MATRIX(DynaCoM, uni_A), bp::arg("self"),
            "Unilaterality of the active contacts, block-diagonal.")
       .def("uni_b", &DynaCoM::uni_b, bp::arg("self"))
-      .def("fri_A", &DynaCoM::fri_A, bp::arg("self"),
+      .def("fri_A", DYNACOM_MATRIX(DynaCoM, fri_A), bp::arg("self"),
            "Friction of the active contacts, block-diagonal.")
       .def("fri_b", &DynaCoM::fri_b, bp::arg("self"))
       .def("reg_A", &DynaCoM::reg_A, bp::arg("self"), "Weights of the active contacts, stacked.")
       .def("reg_b", &DynaCoM::reg_b, bp::arg("self"))
-      .def("ne_A", &DynaCoM::ne_A, bp::arg("self"),
+      .def("ne_A", DYNACOM_MATRIX(DynaCoM, ne_A), bp::arg("self"),
            "Newton-Euler matrices of the active contacts, side by side, (6, n).")
       .def("ne_b", &DynaCoM::ne_b, bp::arg("self"), Copied(),
            "The wrench that the last distribution was asked for, (6,).")

@@ -44,11 +44,11 @@ bp::list getContacts(const MotionAnalysis& analysis) {
 // Reads a matrix member with a row per frame.
 template <auto member>
 struct Rows;
-template <class Class, class Matrix, Matrix Class::* member>
+template <class Class, class Matrix, Matrix Class::*member>
 struct Rows<member> {
-  static auto get(const Class& self) {
-    using Result = Eigen::Matrix<typename Matrix::Scalar, Eigen::Dynamic, Eigen::Dynamic>;
-    return Result((self.*member).transpose());
+  static bp::object get(const Class& self) {
+    using Transposed = Eigen::Matrix<typename Matrix::Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+    return toArray(Transposed((self.*member).transpose()));
   }
 };
 
@@ -116,16 +116,17 @@ void exposeMotion() {
       .def("validate", &Schedule::validate, (bp::arg("self"), bp::arg("frames")),
            "Raises ValueError if a name is there twice or active is not (frames, C).");
 
-  bp::def("analyzeMotion", &analyze,
-          (bp::arg("robot"), bp::arg("motion"), bp::arg("schedule"),
-           bp::arg("flatHorizontalGround") = true, bp::arg("omega") = 0.,
-           bp::arg("progress") = bp::object()),
-          "Computes dynamics and distribution for every frame of a motion. The robot, a DynaCoM,\n"
-          "is left as it is; contacts without schedule are never active.\n\n"
-          "flatHorizontalGround: as in DynaCoM.computeDynamics; omega: of the virtual repellent\n"
-          "point [rad/s], 0 stands for sqrt(g / mean height of the centre of mass above the\n"
-          "ground); progress: called now and then with the number of frames done. Raises ValueError\n"
-          "if motion or schedule is not valid, or names a contact that the robot does not know.");
+  bp::def(
+      "analyzeMotion", &analyze,
+      (bp::arg("robot"), bp::arg("motion"), bp::arg("schedule"),
+       bp::arg("flatHorizontalGround") = true, bp::arg("omega") = 0.,
+       bp::arg("progress") = bp::object()),
+      "Computes dynamics and distribution for every frame of a motion. The robot, a DynaCoM,\n"
+      "is left as it is; contacts without schedule are never active.\n\n"
+      "flatHorizontalGround: as in DynaCoM.computeDynamics; omega: of the virtual repellent\n"
+      "point [rad/s], 0 stands for sqrt(g / mean height of the centre of mass above the\n"
+      "ground); progress: called now and then with the number of frames done. Raises ValueError\n"
+      "if motion or schedule is not valid, or names a contact that the robot does not know.");
 
   using Analysis = MotionAnalysis;
   using Contact = MotionAnalysis::Contact;

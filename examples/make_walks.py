@@ -118,9 +118,10 @@ ANYMAL = Robot(
     reference="standing",
     contacts={foot: foot for foot in ANYMAL_FEET},
     feet=ANYMAL_FEET,
-    # The radius of the spheres that the URDF has for feet. Their centres lie 0.0225 m up the shanks
-    # from these frames, about which crocoddyl's contact forces have no moment.
-    frame_height=0.03,
+    # The feet are spheres of radius 0.03 m in the URDF. Their centres lie 0.0225 m up the shanks from
+    # these frames, about which crocoddyl's contact forces have no moment: at this height of the
+    # frames the spheres touch the ground, within 2 mm, as the shanks incline.
+    frame_height=0.0086,
     sole=None,
 )
 

@@ -23,9 +23,9 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 }  // namespace
 
 void DynaCoMSettings::validate() const {
-  internal::requireField(gravity.allFinite() && gravity.x() == 0. && gravity.y() == 0. &&
-                             gravity.z() <= 0.,
-                         "DynaCoMSettings.gravity", "along -z or zero", gravity.transpose());
+  internal::requireField(
+      gravity.allFinite() && gravity.x() == 0. && gravity.y() == 0. && gravity.z() <= 0.,
+      "DynaCoMSettings.gravity", "along -z or zero", gravity.transpose());
 }
 
 std::string DynaCoMSettings::to_string() const { return internal::concat(*this); }
@@ -203,8 +203,8 @@ pinocchio::FrameIndex DynaCoM::findFrame(const ContactBase& contact) const {
 // in data.
 void DynaCoM::place(ContactBase& contact, const Eigen::Vector3d& com) {
   contact.setFrameID(findFrame(contact));
-  contact.updateNewtonEuler(
-      com, pinocchio::updateFramePlacement(model_, data_, contact.getFrameID()));
+  contact.updateNewtonEuler(com,
+                            pinocchio::updateFramePlacement(model_, data_, contact.getFrameID()));
 }
 
 const std::shared_ptr<ContactBase>& DynaCoM::getContact(const std::string& name) const {

@@ -122,8 +122,8 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
 
   result.omega = settings.omega;
   if (result.omega == 0.)
-    result.omega = computeOmega(result.com, -robot.getSettings().gravity.z(),
-                                robot.getGroundHeight());
+    result.omega =
+        computeOmega(result.com, -robot.getSettings().gravity.z(), robot.getGroundHeight());
   if (!std::isnan(result.omega)) {
     // (7, 8)
     result.vrp = result.com.topRows<2>() - result.acom.topRows<2>() / std::pow(result.omega, 2);

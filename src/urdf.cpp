@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "urdf.hpp"
 
+#include <console_bridge/console.h>
+
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <pinocchio/multibody/joint.hpp>
 #include <pinocchio/parsers/urdf.hpp>
 
@@ -11,6 +14,28 @@
 namespace dynacom::internal {
 
 namespace {
+
+// Takes what the URDF parser would print, for as long as it lives. The parser's output is one for
+// the whole process, so only one thread can have it at a time.
+class ParserErrors : public console_bridge::OutputHandler {
+ public:
+  ParserErrors() : lock_(mutex_) { console_bridge::useOutputHandler(this); }
+  ~ParserErrors() override { console_bridge::restorePreviousOutputHandler(); }
+  ParserErrors(const ParserErrors&) = delete;
+  ParserErrors& operator=(const ParserErrors&) = delete;
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR) return;
+    text_ += (text_.empty() ? "" : "; ") + text;
+  }
+
+  const std::string& text() const { return text_; }
+
+ private:
+  static inline std::mutex mutex_;
+  std::lock_guard<std::mutex> lock_;
+  std::string text_;
+};
 
 // The file's content. Reading it here, not in the parser, tells a missing file from a bad one.
 std::string readFile(const std::string& path) {
@@ -34,14 +59,20 @@ bool isXml(const std::string& urdf) {
 pinocchio::Model readUrdf(const std::string& urdf) {
   if (urdf.empty()) throwInvalid("DynaCoMSettings.urdf must be a file or XML, got ''");
   const bool is_xml = isXml(urdf);
+  const std::string xml = is_xml ? urdf : readFile(urdf);
+  const std::string source = is_xml ? "the XML given" : "'" + urdf + "'";
+
   pinocchio::Model model;
+  const ParserErrors errors;
   try {
-    pinocchio::urdf::buildModelFromXML(is_xml ? urdf : readFile(urdf),
-                                       pinocchio::JointModelFreeFlyer(), model);
+    pinocchio::urdf::buildModelFromXML(xml, pinocchio::JointModelFreeFlyer(), model);
   } catch (const std::exception& error) {
-    throwInvalid("DynaCoMSettings.urdf: ", is_xml ? "the XML given" : "'" + urdf + "'",
-                 " is not a robot's URDF (", error.what(), ")");
+    throwInvalid("DynaCoMSettings.urdf: ", source,
+                 " is not a robot's URDF: ", errors.text().empty() ? error.what() : errors.text());
   }
+  // The parser goes on after some errors, without the inertia that it could not read, for example.
+  if (!errors.text().empty())
+    throwInvalid("DynaCoMSettings.urdf: ", source, " has errors: ", errors.text());
   return model;
 }
 

@@ -1,0 +1,1345 @@
+# SPDX-License-Identifier: BSD-2-Clause
+import copy
+import gc
+import inspect
+import re
+import threading
+import weakref
+from pathlib import Path
+
+import dynacom
+import numpy as np
+import pinocchio as pin
+import pytest
+from dynacom import (
+    Contact6D,
+    ContactBase,
+    ContactPoint,
+    DistributionStatus,
+    DynaCoM,
+    DynacomError,
+    DynaCoMSettings,
+    NotReadyError,
+)
+from dynacom.robots import Robot
+from helpers import (
+    CALM,
+    UP,
+    array_kinds,
+    assert_gives_wrench,
+    assert_within_cones,
+    block_diagonal,
+    cheapest_forces,
+    documentation,
+    point,
+    random_configuration,
+    random_humanoid,
+    reference_configuration,
+    robots_folder,
+    sole,
+)
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+SOLVED = DistributionStatus.Solved
+G = 9.81
+
+PENDULUM = """
+<robot name="pendulum">
+  <link name="base"><inertial>
+    <mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+  </inertial></link>
+  <link name="bob"><inertial>
+    <origin xyz="0 0 -1"/>
+    <mass value="3"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+  </inertial></link>
+  <joint name="hinge" type="continuous">
+    <parent link="base"/><child link="bob"/><axis xyz="0 1 0"/>
+  </joint>
+</robot>
+"""
+
+
+@pytest.fixture(scope="module")
+def humanoid() -> pin.Model:
+    return random_humanoid(0)
+
+
+@pytest.fixture
+def robot(humanoid: pin.Model) -> DynaCoM:
+    """It knows three soles, of which one is not active."""
+    robot = DynaCoM(humanoid)
+    for name, active in (("a", True), ("b", True), ("c", False)):
+        robot.addContact(sole_of(humanoid, name), name, active)
+    return robot
+
+
+FRAMES = {"a": "rleg6_joint", "b": "lleg6_joint", "c": "rarm5_joint", "d": "larm5_joint"}
+
+
+def sole_of(model: pin.Model, name: str) -> Contact6D:
+    """Different for each name, so that no two can be mistaken for each other."""
+    frame = FRAMES[name]
+    assert model.existFrame(frame)
+    size = 0.1 + 0.01 * ord(name)
+    return sole(frame_name=frame, mu=5.0, gu=4.0, half_length=size, half_width=0.5 * size)
+
+
+def motion(model: pin.Model, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return random_configuration(model, seed), *rng.uniform(-1.0, 1.0, (2, model.nv))
+
+
+def distribute(robot: DynaCoM) -> DistributionStatus:
+    return robot.distributeForce(
+        robot.getGroundCoMForce(), robot.getGroundCoMTorque(), robot.getCoM()
+    )
+
+
+def state(robot: DynaCoM) -> dict[str, object]:
+    """All that a robot hands out, to tell whether anything has changed."""
+    values = {name: getattr(robot, name)() for name in GETTERS}
+    values["data.com"] = robot.getData().com[0].copy()
+    values["data.oMi"] = [placement.homogeneous for placement in robot.getData().oMi]
+    for name in robot.getKnownContacts():
+        contact = robot.getContact(name)
+        for item in ("appliedForce", "ne_A", "reg_A", "uni_A", "fri_A", "getFrameID"):
+            values[f"{name}.{item}"] = getattr(contact, item)()
+        values[f"{name}.pose"] = contact.getPose().homogeneous
+    return values
+
+
+MOTION_GETTERS = (
+    "getGroundCoMForce",
+    "getGroundCoMTorque",
+    "getCoM",
+    "getVCoM",
+    "getACoM",
+    "getAM",
+    "getAMVariation",
+    "getCoP",
+    "getVRP",
+    "getNL",
+)
+STACKED = ("uni_A", "uni_b", "fri_A", "fri_b", "reg_A", "reg_b", "ne_A", "ne_b", "allForces")
+GETTERS = (
+    *MOTION_GETTERS,
+    *STACKED,
+    "getMass",
+    "getGroundHeight",
+    "getSettings",
+    "getActiveContacts",
+    "getKnownContacts",
+    "getDistributionStatus",
+)
+
+
+def assert_same(actual: dict[str, object], expected: dict[str, object]) -> None:
+    assert actual.keys() == expected.keys()
+    for name, value in expected.items():
+        if isinstance(value, np.ndarray | list) and name not in (
+            "getActiveContacts",
+            "getKnownContacts",
+        ):
+            assert_array_equal(actual[name], value, name)
+        else:
+            assert actual[name] == value, name
+
+
+# Initialisation.
+
+
+def pendulum_settings(**fields: object) -> DynaCoMSettings:
+    settings = DynaCoMSettings()
+    settings.urdf = PENDULUM
+    for name, value in fields.items():
+        setattr(settings, name, value)
+    return settings
+
+
+def test_from_settings(tmp_path):
+    """The XML itself or a file; the root joint is a free-flyer."""
+    path = tmp_path / "pendulum.urdf"
+    path.write_text(PENDULUM)
+    later = DynaCoM()
+    later.initialize(settings=pendulum_settings())
+    for robot in (
+        DynaCoM(pendulum_settings()),
+        DynaCoM(settings=pendulum_settings(urdf=str(path))),
+        DynaCoM(pendulum_settings(urdf="\n " + PENDULUM)),
+        later,
+    ):
+        model = robot.getModel()
+        assert (model.nq, model.nv) == (7 + 2, 6 + 1)
+        assert model.joints[1].shortname() == "JointModelFreeFlyer"
+        assert robot.getMass() == 5.0
+        assert_array_equal(model.gravity.linear, [0, 0, -9.81])
+    assert robot.getSettings() == pendulum_settings()
+
+
+def test_from_a_model(humanoid):
+    later = DynaCoM()
+    later.initialize(model=humanoid)
+    for robot in (DynaCoM(humanoid), DynaCoM(model=humanoid), later):
+        assert robot.getModel() == humanoid
+        assert isinstance(robot.getModel(), pin.Model)
+        assert isinstance(robot.getData(), pin.Data)
+        assert_allclose(robot.getMass(), pin.computeTotalMass(humanoid), rtol=1e-15)
+        assert robot.getSettings() == DynaCoMSettings()
+
+
+def test_the_model_is_copied(humanoid):
+    model = pin.Model(humanoid)
+    robot = DynaCoM(model)
+    q, v, a = motion(model, 0)
+    robot.computeDynamics(q, v, a)
+    expected = robot.getGroundCoMForce()
+    model.gravity.linear = np.zeros(3)
+    inertia = model.inertias[1]
+    inertia.mass = 1000.0
+    model.inertias[1] = inertia
+    robot.computeDynamics(q, v, a)
+    assert_array_equal(robot.getGroundCoMForce(), expected)
+
+
+@pytest.mark.parametrize("gravity", [0.0, -1.62, -9.81, -274.0, 0, -10])
+def test_gravity_of_any_magnitude(humanoid, gravity):
+    model = pin.Model(humanoid)
+    model.gravity.linear = np.array([0.0, 0.0, gravity])
+    q, v = pin.neutral(model), np.zeros(model.nv)
+    robot = DynaCoM(model)
+    robot.computeDynamics(q, v, v)
+    assert_allclose(robot.getGroundCoMForce(), [0, 0, -robot.getMass() * gravity], atol=1e-13)
+    assert_array_equal(robot.getSettings().gravity, [0, 0, gravity])
+
+    settings = pendulum_settings(gravity=np.array([0, 0, gravity]))
+    robot = DynaCoM(settings)
+    robot.computeDynamics(pin.neutral(robot.getModel()), np.zeros(7), np.zeros(7))
+    assert_allclose(robot.getGroundCoMForce(), [0, 0, -5.0 * gravity], atol=1e-13)
+    assert_array_equal(robot.getModel().gravity.linear, [0, 0, gravity])
+    assert robot.getSettings() == settings
+
+
+@pytest.mark.parametrize(
+    "gravity", [[0, 0, 9.81], [1e-9, 0, -9.81], [0, -9.81, 0], [0, 0, np.nan], [0, 0, -np.inf]]
+)
+def test_gravity_in_other_directions(robot, humanoid, gravity):
+    gravity = np.array(gravity, dtype=float)
+    settings = pendulum_settings(gravity=gravity)
+    model = pin.Model(humanoid)
+    model.gravity.linear = gravity
+    before = state(robot)
+    for refuse in (
+        settings.validate,
+        lambda: DynaCoM(settings),
+        lambda: DynaCoM(model),
+        lambda: robot.initialize(settings),
+        lambda: robot.initialize(model),
+    ):
+        with pytest.raises(ValueError, match=r"gravity must be along -z or zero, got .*\d|nan|inf"):
+            refuse()
+    assert_same(state(robot), before)
+
+
+@pytest.mark.parametrize(
+    ("urdf", "message"),
+    [
+        ("", "urdf must be a file or XML, got ''"),
+        ("no/such/file.urdf", "urdf.*cannot read the file 'no/such/file.urdf'"),
+        ("<robot", "urdf.*the XML given is not a robot's URDF"),
+        ("<html></html>", "urdf.*the XML given is not a robot's URDF"),
+        ("<robot name='ghost'><link name='a'/></robot>", "'ghost' must have a mass > 0, got 0"),
+    ],
+)
+def test_urdf_that_cannot_be_read(robot, urdf, message):
+    """Nothing has changed: the robot known before is still there, with its contacts."""
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    before = state(robot)
+    settings = pendulum_settings(urdf=urdf)
+    with pytest.raises(ValueError, match=message):
+        DynaCoM(settings)
+    with pytest.raises(ValueError, match=message):
+        robot.initialize(settings)
+    assert_same(state(robot), before)
+    assert distribute(robot) == SOLVED
+
+
+def test_urdf_messages_are_plain(tmp_path):
+    """A missing file is told as such, not as a bad robot that contains an error message."""
+    for urdf in ("no/such/file.urdf", str(tmp_path)):
+        with pytest.raises(ValueError) as error:
+            DynaCoM(pendulum_settings(urdf=urdf))
+        assert str(error.value).count("DynaCoMSettings.urdf") == 1
+        assert "not a robot's URDF" not in str(error.value)
+
+
+def test_model_without_mass(robot):
+    before = state(robot)
+    with pytest.raises(ValueError, match="must have a mass > 0, got 0"):
+        DynaCoM(pin.Model())
+    with pytest.raises(ValueError, match="must have a mass > 0, got 0"):
+        robot.initialize(pin.Model())
+    assert_same(state(robot), before)
+
+
+@pytest.mark.parametrize("wrong", [3, "talos.urdf", {}, Contact6D()])
+def test_initialize_with_something_else(robot, wrong):
+    before = state(robot)
+    with pytest.raises(TypeError):
+        DynaCoM(wrong)
+    with pytest.raises(TypeError):
+        robot.initialize(wrong)
+    assert_same(state(robot), before)
+
+
+def test_initialize_again(robot):
+    """Contacts and motion are forgotten, as are the forces that the contacts were given."""
+    robot.computeNL(3.0, *motion(robot.getModel(), 0))
+    assert distribute(robot) == SOLVED
+    contact = robot.getContact("a")
+    assert contact.appliedForce().any()
+    robot.initialize(pendulum_settings())
+    assert robot.getKnownContacts() == []
+    assert not contact.appliedForce().any()
+    assert robot.getMass() == 5.0
+    assert robot.getDistributionStatus() == DistributionStatus.NoContact
+    for name in (*MOTION_GETTERS, "ne_b"):
+        assert np.isnan(getattr(robot, name)()).all(), name
+    robot.initialize(random_humanoid(1))
+    robot.addContact(contact, "again")
+    assert robot.getContact("again") is contact
+
+
+BEFORE_INITIALIZE = {
+    "computeDynamics": lambda robot: robot.computeDynamics(np.zeros(7), np.zeros(6), np.zeros(6)),
+    "computeNL": lambda robot: robot.computeNL(3.0),
+    "computeNL of a motion": lambda robot: robot.computeNL(
+        3.0, np.zeros(7), np.zeros(6), np.zeros(6)
+    ),
+    "addContact": lambda robot: robot.addContact(sole(), "a"),
+    "addContact6d": lambda robot: robot.addContact6d(sole(), "a"),
+    "distributeForce": lambda robot: robot.distributeForce(*np.ones((3, 3))),
+}
+
+
+@pytest.mark.parametrize("call", BEFORE_INITIALIZE.values(), ids=BEFORE_INITIALIZE.keys())
+def test_use_before_initialize(call):
+    robot = DynaCoM()
+    with pytest.raises(NotReadyError, match=r"DynaCoM .* before initialize\(\)") as error:
+        call(robot)
+    assert isinstance(error.value, RuntimeError)
+    assert isinstance(error.value, DynacomError)
+    robot.initialize(pendulum_settings())
+    robot.computeDynamics(pin.neutral(robot.getModel()), np.zeros(7), np.zeros(7))
+
+
+def test_computeNL_needs_a_motion(robot):
+    with pytest.raises(NotReadyError, match=r"computeNL needs computeDynamics\(\)"):
+        robot.computeNL(3.0)
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    robot.computeNL(3.0)
+    robot.initialize(pendulum_settings())
+    with pytest.raises(NotReadyError, match=r"computeNL needs computeDynamics\(\)"):
+        robot.computeNL(3.0)
+
+
+def test_before_computeDynamics(robot):
+    """NaN, which no one takes for a result, and no force anywhere."""
+    for name in (*MOTION_GETTERS, "ne_b"):
+        values = getattr(robot, name)()
+        assert np.isnan(values).all(), name
+        assert values.shape == ((2,) if name in ("getCoP", "getVRP", "getNL") else values.shape)
+    assert robot.getDistributionStatus() == DistributionStatus.NoContact
+    assert_array_equal(robot.allForces(), np.zeros(12))
+
+
+# Dynamics; test_centroidal.py has more of them.
+
+
+def test_keywords_and_defaults(robot):
+    q, v, a = motion(robot.getModel(), 0)
+    robot.computeDynamics(q, v, a)
+    expected = state(robot)
+    zero = np.zeros(6)
+    robot.computeDynamics(q=q, v=v, a=a, extWrench=zero, flatHorizontalGround=True)
+    assert_same(state(robot), expected)
+    robot.computeDynamics(a=a, v=v, q=q)
+    assert_same(state(robot), expected)
+    robot.computeDynamics(q, v, a, zero, True)
+    assert_same(state(robot), expected)
+
+    assert robot.computeNL(omega=3.0) is None
+    expected = state(robot)
+    assert robot.computeNL(omega=3.0, q=q, v=v, a=a) is None
+    assert_same(state(robot), expected)
+    robot.computeNL(omega=3.0, q=q, v=v, a=a, extWrench=zero, flatHorizontalGround=True)
+    assert_same(state(robot), expected)
+    robot.computeNL(3.0, q, v, a, zero, True)
+    assert_same(state(robot), expected)
+
+    status = robot.distributeForce(
+        groundCoMForce=robot.getGroundCoMForce(),
+        groundCoMTorque=robot.getGroundCoMTorque(),
+        com=robot.getCoM(),
+    )
+    assert status == SOLVED
+    expected = state(robot)
+    assert distribute(robot) == SOLVED
+    assert_same(state(robot), expected)
+
+    other = sole_of(robot.getModel(), "d")
+    robot.addContact(contact=other, name="d", active=False)
+    assert "d" not in robot.getActiveContacts()
+    robot.activateContact(name="d")
+    robot.deactivateContact(name="d")
+    assert robot.getContact(name="d") is other
+    robot.removeContact(name="d")
+    robot.addContact6d(contact=other, name="d", active=False)
+    robot.activateContact6d(name="d")
+    robot.deactivateContact6d(name="d")
+    robot.removeContact6d(name="d")
+    robot.addContact(other, "d")
+    assert robot.getActiveContacts()[-1] == "d"
+    robot.removeContact("d")
+    robot.addContact6d(other, "d")
+    assert robot.getActiveContacts()[-1] == "d"
+    robot.setGroundHeight(groundHeight=0.5)
+    assert robot.getGroundHeight() == 0.5
+
+
+def test_virtual_repellent_point_by_hand():
+    """A pendulum whose base accelerates: v = c - dd(c)/omega², n = p - v."""
+    robot = DynaCoM(pendulum_settings())
+    q = pin.neutral(robot.getModel())
+    q[:3] = [1.0, 2.0, 3.0]
+    a = np.array([0.5, -1.5, 0.25, 0, 0, 0, 0])
+    robot.computeNL(2.0, q, np.zeros(7), a)
+    com = np.array([1.0, 2.0, 3.0 - 0.6])
+    force = 5.0 * np.array([0.5, -1.5, 0.25 + G])
+    cop = com[:2] - force[:2] * com[2] / force[2]
+    assert_allclose(robot.getCoM(), com, rtol=1e-15)
+    assert_allclose(robot.getGroundCoMForce(), force, rtol=1e-15)
+    assert_allclose(robot.getCoP(), cop, rtol=1e-14)
+    assert_allclose(robot.getVRP(), [1.0 - 0.5 / 4, 2.0 + 1.5 / 4], rtol=1e-14)
+    assert_allclose(robot.getNL(), cop - [1.0 - 0.5 / 4, 2.0 + 1.5 / 4], rtol=1e-12)
+    robot.computeNL(4)
+    assert_allclose(robot.getVRP(), [1.0 - 0.5 / 16, 2.0 + 1.5 / 16], rtol=1e-14)
+
+
+def test_non_linearity_vanishes_for_the_linear_pendulum():
+    """Constant height and no change of angular momentum: the CoP repels the CoM by g / height."""
+    robot = DynaCoM(pendulum_settings())
+    q = pin.neutral(robot.getModel())
+    q[2] = 1.5
+    a = np.array([0.5, -1.5, 0, 0, 0, 0, 0])
+    robot.computeNL(np.sqrt(G / 0.9), q, np.zeros(7), a)
+    assert_allclose(robot.getNL(), np.zeros(2), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("omega", [0, -1.0, np.nan])
+def test_omega_out_of_range(robot, omega):
+    robot.computeNL(3.0, *motion(robot.getModel(), 0))
+    before = state(robot)
+    with pytest.raises(ValueError, match=f"omega must be > 0 rad/s, got {omega:g}"):
+        robot.computeNL(omega)
+    assert_same(state(robot), before)
+
+
+@pytest.mark.parametrize("height", [np.nan, np.inf, -np.inf])
+def test_ground_height_out_of_range(robot, height):
+    robot.setGroundHeight(-0.5)
+    with pytest.raises(ValueError, match=f"groundHeight must be finite, got {height:g}"):
+        robot.setGroundHeight(height)
+    assert robot.getGroundHeight() == -0.5
+
+
+def test_external_wrench_is_about_the_centre_of_mass(talos, talos_standing):
+    """A load on a shoulder: the feet bear its weight, and its moment moves the CoP."""
+    robot = talos.dynacom()
+    zero = np.zeros(talos.model.nv)
+    load = np.array([0, 0, -100, 0, 5, 0])
+    robot.computeDynamics(talos_standing, zero, zero, load)
+    weight = G * robot.getMass()
+    assert_allclose(robot.getGroundCoMForce(), [0, 0, weight + 100], rtol=0, atol=1e-10)
+    assert_allclose(robot.getGroundCoMTorque(), [0, -5, 0], rtol=0, atol=1e-12)
+    expected = robot.getCoM()[:2] + [5 / (weight + 100), 0]
+    assert_allclose(robot.getCoP(), expected, rtol=0, atol=1e-15)
+
+
+# Arrays.
+
+
+def test_arrays_of_any_kind(robot):
+    model = robot.getModel()
+    rng = np.random.default_rng(0)
+    q = pin.neutral(model)
+    q[7:] = rng.integers(-2, 3, model.nq - 7)
+    v, a = rng.integers(-3, 4, (2, model.nv))
+    wrench, com = np.arange(6) - 3, np.array([1, -1, 2])
+    states = {}
+    robot.computeNL(3, q, v, a, wrench)
+    for kinds in zip(*map(array_kinds, (q, v, a, wrench, com, wrench[:3])), strict=True):
+        (kind, *_), (q_, v_, a_, wrench_, com_, force_) = zip(*kinds, strict=True)
+        robot.computeDynamics(q_, v_, a_, wrench_, False)
+        first = state(robot)
+        robot.computeNL(3, q_, v_, a_, wrench_)
+        second = state(robot)
+        robot.distributeForce(force_, com_, com_)
+        states[kind] = first, second, state(robot)
+    for values in states.values():
+        for actual, expected in zip(values, states["plain"], strict=True):
+            assert_same(actual, expected)
+
+
+@pytest.mark.parametrize("name", GETTERS[: len(MOTION_GETTERS) + len(STACKED)])
+def test_arrays_handed_out_are_copies(robot, name):
+    robot.computeNL(3.0, *motion(robot.getModel(), 0))
+    assert distribute(robot) == SOLVED
+    before = state(robot)
+    values = getattr(robot, name)()
+    expected = values.copy()
+    values += 1.0
+    assert_same(state(robot), before)
+    values = getattr(robot, name)()
+    robot.computeNL(4.0, *motion(robot.getModel(), 1))
+    distribute(robot)
+    assert_array_equal(values, expected)
+    del robot
+    gc.collect()
+    assert_array_equal(values, expected)
+
+
+def test_arrays_handed_in_are_copies(robot):
+    q, v, a = motion(robot.getModel(), 0)
+    wrench = np.ones(6)
+    robot.computeNL(3.0, q, v, a, wrench)
+    force, torque, com = robot.getGroundCoMForce(), robot.getGroundCoMTorque(), robot.getCoM()
+    robot.distributeForce(force, torque, com)
+    before = state(robot)
+    for array in (q, v, a, wrench, force, torque, com):
+        array[:] = 99.0
+    assert_same(state(robot), before)
+
+
+def test_settings_handed_out_are_copies():
+    settings = pendulum_settings()
+    robot = DynaCoM(settings)
+    settings.urdf = "changed"
+    robot.getSettings().urdf = "changed"
+    robot.getSettings().gravity[2] = 0.0
+    assert robot.getSettings() == pendulum_settings()
+
+
+@pytest.mark.parametrize("name", ["q", "v", "a"])
+@pytest.mark.parametrize("change", [-1, 1, None])
+def test_vectors_of_the_wrong_size(robot, name, change):
+    model = robot.getModel()
+    robot.computeNL(3.0, *motion(model, 0))
+    before = state(robot)
+    arguments = dict(zip("qva", motion(model, 1), strict=True))
+    expected = arguments[name].size
+    size = 0 if change is None else expected + change
+    arguments[name] = np.zeros(size)
+    unit = "nq" if name == "q" else "nv"
+    message = rf"^{name} must have {expected} components \({unit}\), got {size}$"
+    with pytest.raises(ValueError, match=message):
+        robot.computeDynamics(**arguments)
+    with pytest.raises(ValueError, match=message):
+        robot.computeNL(3.0, **arguments)
+    assert_same(state(robot), before)
+
+
+def test_wrenches_of_the_wrong_size(robot):
+    """The docstring promises a ValueError for extWrench too."""
+    q, v, a = motion(robot.getModel(), 0)
+    robot.computeNL(3.0, q, v, a)
+    before = state(robot)
+    for size in (0, 3, 5, 7):
+        with pytest.raises(ValueError, match=f"extWrench must have 6 .*, got {size}"):
+            robot.computeDynamics(q, v, a, np.zeros(size))
+        with pytest.raises(ValueError, match=f"extWrench must have 6 .*, got {size}"):
+            robot.computeNL(3.0, q, v, a, extWrench=np.zeros(size))
+    assert_same(state(robot), before)
+
+
+@pytest.mark.parametrize("name", ["groundCoMForce", "groundCoMTorque", "com"])
+def test_distribution_of_vectors_of_the_wrong_size(robot, name):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    before = state(robot)
+    arguments = dict.fromkeys(("groundCoMForce", "groundCoMTorque", "com"), np.zeros(3))
+    for size in (0, 2, 4, 6):
+        arguments[name] = np.zeros(size)
+        with pytest.raises(ValueError, match=f"{name} must have 3 .*, got {size}"):
+            robot.distributeForce(**arguments)
+    assert_same(state(robot), before)
+
+
+@pytest.mark.parametrize(
+    "wrong", [None, "q", 3.0, [0.0, 1.0], np.zeros((2, 2)), np.array(["a"]), np.ones(3) * 1j, {}]
+)
+def test_vectors_of_the_wrong_type(robot, wrong):
+    """An error, after which the robot is as it was and works."""
+    q, v, a = motion(robot.getModel(), 0)
+    robot.computeNL(3.0, q, v, a)
+    before = state(robot)
+    for call in (
+        lambda: robot.computeDynamics(wrong, v, a),
+        lambda: robot.computeDynamics(q, wrong, a),
+        lambda: robot.computeDynamics(q, v, wrong),
+        lambda: robot.computeDynamics(q, v, a, wrong),
+        lambda: robot.computeNL(3.0, wrong, v, a),
+        lambda: robot.distributeForce(wrong, np.zeros(3), np.zeros(3)),
+        lambda: robot.distributeForce(np.zeros(3), np.zeros(3), wrong),
+    ):
+        with pytest.raises(TypeError):
+            call()
+    assert_same(state(robot), before)
+    assert distribute(robot) == SOLVED
+
+
+@pytest.mark.parametrize("wrong", [None, "3", [3.0], np.ones(2), 1j, {}])
+def test_numbers_of_the_wrong_type(robot, wrong):
+    robot.computeNL(3.0, *motion(robot.getModel(), 0))
+    before = state(robot)
+    with pytest.raises(TypeError):
+        robot.setGroundHeight(wrong)
+    with pytest.raises(TypeError):
+        robot.computeNL(wrong)
+    assert_same(state(robot), before)
+
+
+def test_sensor_data_that_is_not_finite(robot):
+    """A fact of the world, not an exception; the next sample is analysed as if nothing had been."""
+    q, v, a = motion(robot.getModel(), 0)
+    robot.computeDynamics(q, v, a)
+    distribute(robot)
+    before = state(robot)
+    for broken in ((np.nan * q, v, a), (q, np.inf * v, a), (q, v, np.nan * a)):
+        robot.computeDynamics(*broken)
+        assert np.isnan(robot.getCoP()).all()
+        assert distribute(robot) == DistributionStatus.NumericalFailure
+        assert_array_equal(robot.allForces(), np.zeros(12))
+        robot.computeDynamics(*broken, flatHorizontalGround=False)
+        assert robot.getDistributionStatus() == DistributionStatus.NumericalFailure
+        assert np.isnan(robot.getCoP()).all()
+        assert_array_equal(robot.allForces(), np.zeros(12))
+    robot.computeDynamics(q, v, a)
+    distribute(robot)
+    assert_same(state(robot), before)
+
+
+# Pinocchio's objects, and lifetimes.
+
+
+def test_model_and_data_keep_the_robot_alive(humanoid):
+    robot = DynaCoM(humanoid)
+    q, v, a = motion(humanoid, 0)
+    robot.computeDynamics(q, v, a)
+    com = robot.getCoM()
+    model, data = robot.getModel(), robot.getData()
+    oMi = data.oMi
+    del robot
+    gc.collect()
+    assert model == humanoid
+    assert_array_equal(data.com[0], com)
+    assert len(oMi) == model.njoints
+    pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a)
+    assert_array_equal(data.com[0], com)
+
+
+def test_model_and_data_are_the_robot_s_own(humanoid):
+    """Not copies: what Pinocchio computes in one's hand is seen by the robot."""
+    robot = DynaCoM(humanoid)
+    model, data = robot.getModel(), robot.getData()
+    pin.centerOfMass(model, data, random_configuration(humanoid, 1))
+    assert_array_equal(robot.getData().com[0], data.com[0])
+    robot.computeDynamics(*motion(humanoid, 2))
+    assert_array_equal(data.com[0], robot.getCoM())
+    state_read = dynacom.readCentroidalState(data)
+    assert_array_equal(state_read.am, robot.getAM())
+
+
+@pytest.mark.parametrize("forward", [pin.forwardKinematics, pin.framesForwardKinematics])
+def test_contacts_follow_data(robot, forward):
+    """A script runs Pinocchio on getData(): at the next distribution contacts stand there."""
+    model, data = robot.getModel(), robot.getData()
+    robot.computeDynamics(*motion(model, 0))
+    q = random_configuration(model, 1)
+    forward(model, data, q)
+    reference = model.createData()
+    pin.framesForwardKinematics(model, reference, q)
+    force, torque, com = robot.getGroundCoMForce(), np.zeros(3), np.array([0.1, 0.2, 0.3])
+    robot.distributeForce(force, torque, com)
+    for name in ("a", "b"):
+        contact = robot.getContact(name)
+        pose = reference.oMf[model.getFrameId(FRAMES[name])]
+        assert_array_equal(contact.getPose().homogeneous, pose.homogeneous)
+        expected = pin.SE3(pose.rotation, pose.translation - com).toDualActionMatrix()
+        assert_allclose(contact.ne_A(), expected, rtol=0, atol=1e-15)
+    assert_array_equal(robot.ne_b(), np.concatenate([force, torque]))
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_contacts_are_fresh_after_computeDynamics(robot, flat):
+    """All that are known, active or not, whichever flag."""
+    model = robot.getModel()
+    reference = model.createData()
+    for seed in (0, 1):
+        q, v, a = motion(model, seed)
+        robot.computeDynamics(q, v, a, flatHorizontalGround=flat)
+        pin.framesForwardKinematics(model, reference, q)
+        for name in robot.getKnownContacts():
+            contact = robot.getContact(name)
+            pose = reference.oMf[model.getFrameId(FRAMES[name])]
+            assert_allclose(contact.getPose().homogeneous, pose.homogeneous, rtol=0, atol=1e-14)
+            pose = contact.getPose()
+            expected = pin.SE3(pose.rotation, pose.translation - robot.getCoM())
+            assert_allclose(contact.ne_A(), expected.toDualActionMatrix(), rtol=0, atol=1e-14)
+
+
+def test_contacts_of_frames_that_were_added(humanoid):
+    """Operational frames count as much as the URDF's."""
+    model = pin.Model(humanoid)
+    placement = pin.SE3(pin.exp3(np.array([0.1, 0.2, 0.3])), np.array([0.0, 0.1, -0.2]))
+    parent = model.frames[model.getFrameId("rleg6_joint")].parentJoint
+    model.addFrame(pin.Frame("toe", parent, placement, pin.FrameType.OP_FRAME))
+    robot = DynaCoM(model)
+    contact = point(frame_name="toe")
+    robot.addContact(contact, "toe")
+    robot.computeDynamics(*motion(model, 0))
+    expected = robot.getData().oMi[parent] * placement
+    assert_allclose(contact.getPose().homogeneous, expected.homogeneous, rtol=0, atol=1e-15)
+    assert contact.getFrameID() == model.getFrameId("toe")
+
+
+def test_contact_identity(robot):
+    """What is added is what is handed out, as the type it is."""
+    contact = sole_of(robot.getModel(), "d")
+    robot.addContact(contact, "d")
+    assert robot.getContact("d") is contact
+    assert isinstance(robot.getContact("d"), Contact6D)
+    pointed = point(frame_name=FRAMES["d"])
+    robot.addContact(pointed, "point")
+    assert robot.getContact("point") is pointed
+    assert isinstance(robot.getContact("point"), ContactPoint)
+    assert isinstance(pointed, ContactBase)
+
+
+def test_contacts_live_as_long_as_anyone_holds_them(robot):
+    contact = sole_of(robot.getModel(), "d")
+    seen = weakref.ref(contact)
+    contact.setMu(0.123)
+    robot.addContact(contact, "d")
+    del contact
+    gc.collect()
+    assert robot.getContact("d").getSettings().mu == 0.123
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    distribute(robot)
+
+    held = robot.getContact("d")
+    robot.removeContact("d")
+    del robot
+    gc.collect()
+    assert held.getSettings().mu == 0.123
+    del held
+    gc.collect()
+    assert seen() is None
+
+
+def test_setters_of_a_shared_contact_act_on_the_next_call(robot):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    contact = robot.getContact("b")
+    contact.setMu(0.25)
+    contact.setForceWeights(np.full(3, 4.0))
+    assert_array_equal(robot.fri_A()[6:, 6:], contact.fri_A())
+    assert_array_equal(robot.reg_A(), [1] * 6 + [4] * 3 + [1] * 3)
+    distribute(robot)
+    with_setters = robot.allForces()
+    contact.initialize(contact.getSettings())
+    distribute(robot)
+    assert_allclose(robot.allForces(), with_setters, rtol=0, atol=1e-9)
+    expected = [robot.getContact("a"), contact]
+    assert_allclose(
+        with_setters, cheapest_forces(expected, robot.ne_b()), rtol=0, atol=1e-6
+    ) if robot.getDistributionStatus() == SOLVED else assert_array_equal(with_setters, 0)
+
+
+def test_contact_of_another_frame_on_the_next_call(robot):
+    """initialize() may name another frame: the contact moves there."""
+    model = robot.getModel()
+    robot.computeDynamics(*motion(model, 0))
+    contact = robot.getContact("a")
+    settings = contact.getSettings()
+    settings.frame_name = FRAMES["d"]
+    contact.initialize(settings)
+    distribute(robot)
+    assert contact.getFrameID() == model.getFrameId(FRAMES["d"])
+    expected = model.createData()
+    pin.framesForwardKinematics(model, expected, motion(model, 0)[0])
+    pose = expected.oMf[contact.getFrameID()]
+    assert_allclose(contact.getPose().homogeneous, pose.homogeneous, rtol=0, atol=1e-14)
+
+    settings.frame_name = "nowhere"
+    contact.initialize(settings)
+    with pytest.raises(ValueError, match="no frame 'nowhere'"):
+        distribute(robot)
+    with pytest.raises(ValueError, match="no frame 'nowhere'"):
+        robot.computeDynamics(*motion(model, 0))
+
+
+# Copies.
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, DynaCoM.copy])
+def test_copies_share_nothing(robot, copied):
+    model = robot.getModel()
+    robot.setGroundHeight(0.25)
+    robot.computeNL(3.0, *motion(model, 0))
+    assert distribute(robot) == SOLVED
+    before = state(robot)
+    other = copied(robot)
+    assert type(other) is DynaCoM
+    assert_same(state(other), before)
+    for name in robot.getKnownContacts():
+        assert other.getContact(name) is not robot.getContact(name)
+        assert type(other.getContact(name)) is Contact6D
+
+    other.getContact("a").setMu(0.1)
+    other.getContact("b").applyForce(np.ones(6))
+    other.setGroundHeight(1.0)
+    other.activateContact("c")
+    other.deactivateContact("a")
+    other.computeNL(4.0, *motion(model, 1))
+    distribute(other)
+    other.removeContact("a")
+    assert_same(state(robot), before)
+
+    changed = state(other)
+    robot.removeContact("b")
+    robot.initialize(pendulum_settings())
+    del robot, model
+    gc.collect()
+    assert_same(state(other), changed)
+    other.computeDynamics(*motion(other.getModel(), 2))
+
+
+def test_copy_before_initialize():
+    other = DynaCoM().copy()
+    with pytest.raises(NotReadyError):
+        other.computeNL(1.0)
+    other.initialize(pendulum_settings())
+
+
+def test_copies_work_in_threads(robot):
+    """Each thread its own copy: the same results as one after the other."""
+    model = robot.getModel()
+    motions = [motion(model, seed) for seed in range(8)]
+
+    def run(worker, results):
+        for q, v, a in motions:
+            worker.computeDynamics(q, v, a)
+            status = distribute(worker)
+            results.append((str(status), worker.allForces()))
+
+    expected = []
+    run(robot.copy(), expected)
+    results = [[] for _ in range(4)]
+    threads = [threading.Thread(target=run, args=(robot.copy(), out)) for out in results]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for out in results:
+        for (status, forces), (expected_status, expected_forces) in zip(out, expected, strict=True):
+            assert status == expected_status
+            assert_array_equal(forces, expected_forces)
+
+
+# Contacts.
+
+
+@pytest.mark.parametrize("add", ["addContact", "addContact6d"])
+def test_contacts_that_cannot_be_added(robot, add):
+    """The message names contact and reason; nothing has changed."""
+    model = robot.getModel()
+    before = state(robot)
+    add = getattr(robot, add)
+    known = robot.getContact("a")
+    new = sole_of(model, "d")
+    for contact, name, message in (
+        (new, "a", "'a' already"),
+        (known, "z", "'z' is known already, as 'a'"),
+        (robot.getContact("c"), "z", "'z' is known already, as 'c'"),
+        (Contact6D(), "z", "'z' was never initialised"),
+        (ContactPoint(), "z", "'z' was never initialised"),
+        (sole(frame_name="nowhere"), "z", "'z': the model has no frame 'nowhere'"),
+        (None, "z", "'z' must not be null"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            add(contact, name)
+    for contact, name in ((new, 3), (new, None), ("a", "z"), (robot, "z"), (sole, "z")):
+        with pytest.raises(TypeError):
+            add(contact, name)
+    assert_same(state(robot), before)
+    assert new.getFrameID() > 2**62
+    add(new, "d")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "removeContact",
+        "activateContact",
+        "deactivateContact",
+        "removeContact6d",
+        "activateContact6d",
+        "deactivateContact6d",
+        "getContact",
+    ],
+)
+def test_names_that_are_not_known(robot, name):
+    """The message names those that are."""
+    before = state(robot)
+    call = getattr(robot, name)
+    with pytest.raises(ValueError, match="no contact 'z'; known: 'a', 'b', 'c'"):
+        call("z")
+    with pytest.raises(ValueError, match="no contact ''"):
+        call("")
+    for wrong in (None, 3, robot.getContact("a")):
+        with pytest.raises(TypeError):
+            call(wrong)
+    assert_same(state(robot), before)
+    with pytest.raises(ValueError, match="no contact 'a'; known: none"):
+        getattr(DynaCoM(robot.getModel()), name)("a")
+
+
+def test_activation(robot):
+    assert robot.getActiveContacts() == ["a", "b"]
+    assert robot.getKnownContacts() == ["a", "b", "c"]
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    assert distribute(robot) == SOLVED
+    before = state(robot)
+    # What is active already, or is not, stays as it is, force and all.
+    robot.activateContact("a")
+    robot.deactivateContact("c")
+    assert_same(state(robot), before)
+
+    contact = robot.getContact("a")
+    assert contact.appliedForce().any()
+    robot.deactivateContact("a")
+    assert not contact.appliedForce().any()
+    assert robot.getActiveContacts() == ["b"]
+    assert sorted(robot.getKnownContacts()) == ["a", "b", "c"]
+    robot.activateContact("a")
+    robot.activateContact("c")
+    assert robot.getActiveContacts() == ["b", "a", "c"]
+    assert isinstance(robot.getActiveContacts(), list)
+
+    assert distribute(robot) == SOLVED
+    robot.removeContact("a")
+    assert not contact.appliedForce().any()
+    assert robot.getKnownContacts() == ["b", "c"]
+
+
+def test_lists_of_names_are_copies(robot):
+    robot.getActiveContacts().clear()
+    robot.getKnownContacts().clear()
+    assert robot.getKnownContacts() == ["a", "b", "c"]
+
+
+def test_late_contacts_are_placed_at_once(robot):
+    """A contact added or activated after computeDynamics gets its placement then."""
+    model = robot.getModel()
+    robot.computeDynamics(*motion(model, 0))
+    pose = {
+        name: pin.updateFramePlacement(model, robot.getData(), model.getFrameId(frame)).homogeneous
+        for name, frame in FRAMES.items()
+    }
+    contact = sole_of(model, "d")
+    robot.addContact(contact, "d", False)
+    assert_array_equal(contact.getPose().homogeneous, pose["d"])
+    contact.setPose(pin.SE3.Identity())
+    robot.activateContact("d")
+    assert_array_equal(contact.getPose().homogeneous, pose["d"])
+    assert contact.ne_A().any()
+
+
+OPERATIONS = st.lists(
+    st.tuples(
+        st.sampled_from(["add", "idle", "remove", "activate", "deactivate", "distribute"]),
+        st.sampled_from("abcd"),
+    ),
+    max_size=25,
+)
+
+
+@CALM
+@given(OPERATIONS)
+def test_any_order_of_operations(operations):
+    """Names, matrices and forces belong together, however contacts came and went."""
+    model = random_humanoid(0)
+    robot = DynaCoM(model)
+    robot.computeDynamics(*motion(model, 3))
+    contacts, active = {}, []
+    for operation, name in operations:
+        if operation in ("add", "idle"):
+            if name in contacts:
+                with pytest.raises(ValueError, match=f"'{name}' already"):
+                    robot.addContact(sole_of(model, name), name)
+                continue
+            contacts[name] = sole_of(model, name)
+            robot.addContact(contacts[name], name, operation == "add")
+            active += [name] if operation == "add" else []
+        elif operation == "distribute":
+            distribute(robot)
+        elif name not in contacts:
+            with pytest.raises(ValueError, match=f"no contact '{name}'"):
+                getattr(robot, f"{operation}Contact")(name)
+        else:
+            getattr(robot, f"{operation}Contact")(name)
+            if operation == "activate":
+                active += [name] if name not in active else []
+            else:
+                active = [other for other in active if other != name]
+                assert not contacts[name].appliedForce().any()
+            if operation == "remove":
+                del contacts[name]
+
+        assert robot.getActiveContacts() == active
+        assert robot.getKnownContacts()[: len(active)] == active
+        assert sorted(robot.getKnownContacts()) == sorted(contacts)
+        for known, contact in contacts.items():
+            assert robot.getContact(known) is contact
+
+    status = distribute(robot)
+    ordered = [contacts[name] for name in active]
+    if not active:
+        assert status == DistributionStatus.NoContact
+        assert robot.allForces().size == 0
+        return
+    assert_array_equal(robot.uni_A(), block_diagonal([c.uni_A() for c in ordered]))
+    assert_array_equal(robot.fri_A(), block_diagonal([c.fri_A() for c in ordered]))
+    assert_array_equal(robot.ne_A(), np.hstack([c.ne_A() for c in ordered]))
+    for name, getter in (
+        ("uni_b", "uni_b"),
+        ("fri_b", "fri_b"),
+        ("reg_A", "reg_A"),
+        ("reg_b", "reg_b"),
+        ("allForces", "appliedForce"),
+    ):
+        expected = np.concatenate([getattr(contact, getter)() for contact in ordered])
+        assert_array_equal(getattr(robot, name)(), expected)
+    # The same contacts, under other names, in the order of the alphabet, on a fresh robot.
+    fresh = DynaCoM(model)
+    fresh.computeDynamics(*motion(model, 3))
+    for name in sorted(active):
+        fresh.addContact(sole_of(model, name), f"the one at {FRAMES[name]}")
+    assert distribute(fresh) == status
+    scale = np.linalg.norm(fresh.ne_b())
+    for name in active:
+        force = fresh.getContact(f"the one at {FRAMES[name]}").appliedForce()
+        assert_allclose(contacts[name].appliedForce(), force, rtol=0, atol=1e-9 * scale)
+
+
+def test_stacked_matrices_are_matrices(humanoid):
+    """Of one point, and of none, too: the number of dimensions does not depend on the contacts."""
+    robot = DynaCoM(humanoid)
+    shapes = {name: getattr(robot, name)().shape for name in STACKED}
+    assert shapes == {
+        "uni_A": (0, 0),
+        "uni_b": (0,),
+        "fri_A": (0, 0),
+        "fri_b": (0,),
+        "reg_A": (0,),
+        "reg_b": (0,),
+        "ne_A": (6, 0),
+        "ne_b": (6,),
+        "allForces": (0,),
+    }
+    robot.addContact(point(frame_name=FRAMES["a"]), "a")
+    assert robot.fri_A().shape == (4, 3)
+    assert robot.ne_A().shape == (6, 3)
+    assert robot.uni_A().shape == (1, 3)
+
+
+# Distribution; test_wrench_distribution.py has more of it.
+
+
+@CALM
+@given(st.integers(0, 2**32 - 1))
+def test_distribution_is_the_quadratic_program(seed):
+    """Through the class: at the model's frames, whatever the wrench and the centre of mass."""
+    rng = np.random.default_rng(seed)
+    model = random_humanoid(seed % 5)
+    robot = DynaCoM(model)
+    names = rng.permutation(list(FRAMES))[: rng.integers(1, 5)]
+    for name in names:
+        contact = sole_of(model, name)
+        contact.setForceWeights(10.0 ** rng.uniform(-1, 1, 3))
+        contact.setMu(rng.uniform(0.2, 1.0))
+        robot.addContact(contact, name)
+    robot.computeDynamics(*motion(model, seed % 1000))
+    com = rng.uniform(-1.0, 1.0, 3)
+    # Once for the contacts' matrices about com, then for a wrench that they can give.
+    robot.distributeForce(np.ones(3), np.zeros(3), com)
+    wrench = np.zeros(6)
+    for name in names:
+        wrench += robot.getContact(name).ne_A() @ [*rng.uniform(-9, 9, 2), 100.0, 1.0, -1.0, 2.0]
+    status = robot.distributeForce(wrench[:3], wrench[3:], com)
+    assert status == robot.getDistributionStatus() == SOLVED
+    contacts = [robot.getContact(name) for name in names]
+    tolerance = 1e-9 * np.linalg.norm(wrench)
+    expected = cheapest_forces(contacts, wrench)
+    assert_allclose(robot.allForces(), expected, rtol=0, atol=1e3 * tolerance)
+    assert_allclose(robot.ne_A() @ robot.allForces(), wrench, rtol=0, atol=tolerance)
+    for contact in contacts:
+        assert_within_cones(contact, tolerance)
+
+
+def test_forces_are_zero_unless_solved(robot):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    com = robot.getCoM()
+    normal = robot.getContact("a").getPose().rotation[:, 2]
+    push = robot.getContact("a").ne_A() @ [0, 0, 100, 0, 0, 0]
+    robot.deactivateContact("b")
+    assert robot.distributeForce(push[:3], push[3:], com) == SOLVED
+    assert_allclose(robot.allForces(), [0, 0, 100, 0, 0, 0], rtol=0, atol=1e-10)
+
+    status = robot.distributeForce(-100 * normal, push[3:], com)
+    assert status == robot.getDistributionStatus() == DistributionStatus.Infeasible
+    assert_array_equal(robot.allForces(), np.zeros(6))
+    assert_array_equal(robot.ne_b(), np.concatenate([-100 * normal, push[3:]]))
+
+    assert robot.distributeForce(push[:3], push[3:], com) == SOLVED
+    robot.deactivateContact("a")
+    status = robot.distributeForce(push[:3], push[3:], com)
+    assert status == robot.getDistributionStatus() == DistributionStatus.NoContact
+    assert robot.allForces().shape == (0,)
+    for name in "abc":
+        assert not robot.getContact(name).appliedForce().any()
+
+
+# Talos at rest.
+
+
+def half_sitting(talos: Robot) -> np.ndarray:
+    """The SRDF's posture, lowered onto the ground."""
+    q = reference_configuration(talos.model, "talos_data/srdf/talos.srdf", "half_sitting")
+    robot = talos.dynacom()
+    zero = np.zeros(talos.model.nv)
+    robot.computeDynamics(q, zero, zero)
+    q[2] -= robot.getContact("left_sole").getPose().translation[2]
+    return q
+
+
+@pytest.fixture(params=["half sitting", "standing"])
+def resting(request, talos: Robot, talos_standing: np.ndarray) -> DynaCoM:
+    robot = talos.dynacom()
+    zero = np.zeros(talos.model.nv)
+    q = talos_standing if request.param == "standing" else half_sitting(talos)
+    robot.computeDynamics(q, zero, zero)
+    assert distribute(robot) == SOLVED
+    return robot
+
+
+def test_weight_at_rest(resting):
+    weight = G * resting.getMass()
+    assert 80.0 < resting.getMass() < 100.0
+    assert_allclose(resting.getGroundCoMForce(), [0, 0, weight], rtol=0, atol=1e-12 * weight)
+    assert_allclose(resting.getGroundCoMTorque(), np.zeros(3), rtol=0, atol=1e-12 * weight)
+    assert_allclose(resting.getCoP(), resting.getCoM()[:2], rtol=0, atol=1e-15)
+    assert_gives_wrench(resting, 1e-9 * weight)
+    total = sum(resting.getContact(name).toWorldForces() for name in ("left_sole", "right_sole"))
+    assert_allclose(total[:3], [0, 0, weight], rtol=0, atol=1e-9 * weight)
+    for name in ("left_sole", "right_sole"):
+        assert_within_cones(resting.getContact(name), 1e-9 * weight)
+        assert 0.4 * weight < resting.getContact(name).toWorldForces()[2] < 0.6 * weight
+
+
+def test_feet_share_by_symmetry(resting, talos):
+    """The feet stand symmetrically: about the point midway between them, so do their forces."""
+    weight = G * resting.getMass()
+    left, right = (resting.getContact(name) for name in ("left_sole", "right_sole"))
+    middle = 0.5 * (left.getPose().translation + right.getPose().translation) + 0.9 * UP
+    assert resting.distributeForce(weight * UP, np.zeros(3), middle) == SOLVED
+    mirrored = right.appliedForce() * [1, -1, 1, -1, 1, -1]
+    # The posture in the SRDF is symmetric to a milliradian.
+    assert_allclose(left.appliedForce(), mirrored, rtol=0, atol=2e-3 * weight)
+    assert_allclose(left.appliedForce()[2], 0.5 * weight, rtol=1e-3)
+    # What leans to the left puts weight on the left.
+    status = resting.distributeForce(weight * UP, np.zeros(3), middle + [0.0, 0.02, 0.0])
+    assert status == SOLVED
+    assert left.appliedForce()[2] > right.appliedForce()[2] + 1.0
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.02])
+def test_both_centres_of_pressure_agree_on_flat_ground(talos, talos_standing, lean):
+    """(6) needs the distributed forces, (5) does not; the soles lie on the ground."""
+    rng = np.random.default_rng(0)
+    robot = talos.dynacom()
+    compared = 0
+    for _ in range(20):
+        v, a = 0.3 * rng.standard_normal((2, talos.model.nv))
+        q = talos_standing.copy()
+        q[2] += lean
+        robot.setGroundHeight(lean)
+        robot.computeDynamics(q, v, a)
+        flat = robot.getCoP()
+        robot.computeDynamics(q, v, a, flatHorizontalGround=False)
+        if robot.getDistributionStatus() == SOLVED:
+            assert_allclose(robot.getCoP(), flat, rtol=0, atol=1e-8)
+            compared += 1
+        else:
+            assert np.isnan(robot.getCoP()).all()
+    assert compared >= 10
+
+
+def test_centre_of_the_pressures_on_stairs(talos, talos_standing):
+    """(6) by its definition: each sole's own centre of pressure, weighted by its vertical force."""
+    q = talos_standing.copy()
+    model = talos.model
+    # One knee bent more: the left foot stands higher.
+    for joint, angle in (("3", -0.6), ("4", 1.2), ("5", -0.6)):
+        q[model.idx_qs[model.getJointId(f"leg_left_{joint}_joint")]] = angle
+    zero = np.zeros(model.nv)
+    robot = talos.dynacom()
+    a = zero.copy()
+    a[:2] = [0.3, 0.1]
+    robot.computeDynamics(q, zero, a, flatHorizontalGround=False)
+    assert robot.getDistributionStatus() == SOLVED
+    moment, vertical = np.zeros(2), 0.0
+    heights = []
+    for name in robot.getActiveContacts():
+        contact = robot.getContact(name)
+        surface = contact.getSurfacePose()
+        force = surface.rotation[2] @ contact.appliedForce()[:3]
+        place = surface.act(np.append(contact.getCoP(), 0.0))
+        moment += force * place[:2]
+        vertical += force
+        heights.append(place[2])
+    assert abs(heights[0] - heights[1]) > 0.05
+    assert_allclose(robot.getCoP(), moment / vertical, rtol=0, atol=1e-12)
+    uneven = robot.getCoP()
+    robot.computeDynamics(q, zero, a)
+    assert np.abs(robot.getCoP() - uneven).max() > 1e-4
+
+
+def test_uneven_ground_without_contact(humanoid):
+    robot = DynaCoM(humanoid)
+    q, v, a = motion(humanoid, 0)
+    robot.computeDynamics(q, v, a, flatHorizontalGround=False)
+    assert robot.getDistributionStatus() == DistributionStatus.NoContact
+    assert np.isnan(robot.getCoP()).all()
+    assert np.isfinite(robot.getGroundCoMForce()).all()
+
+
+def test_urdf_of_a_real_robot(talos):
+    """By its URDF or by its model, Talos is the same."""
+    settings = DynaCoMSettings()
+    settings.urdf = str(robots_folder() / "talos_data/robots/talos_reduced.urdf")
+    robot = DynaCoM(settings)
+    q, v, a = motion(talos.model, 0)
+    robot.computeDynamics(q, v, a)
+    expected = talos.dynacom()
+    expected.computeDynamics(q, v, a)
+    assert_array_equal(robot.getGroundCoMForce(), expected.getGroundCoMForce())
+    assert_array_equal(robot.getAM(), expected.getAM())
+
+
+# The package as a whole.
+
+BINDINGS = [
+    getattr(dynacom, name)
+    for name in dynacom.__all__
+    if getattr(getattr(dynacom, name), "__module__", None) == DynaCoM.__module__
+]
+CLASSES = [item for item in BINDINGS if inspect.isclass(item)]
+CLASSES += [dynacom.MotionAnalysis.Contact]
+# Of enums, what Boost.Python gives them all.
+INHERITED = {"names", "values"}
+
+
+def members(cls: type) -> list[tuple[str, object]]:
+    return [
+        (name, member)
+        for name, member in vars(cls).items()
+        if not name.startswith("_")
+        and name not in INHERITED
+        and not isinstance(member, cls)
+        and not inspect.isclass(member)
+    ]
+
+
+def test_everything_is_exported():
+    import dynacom.dynacom_pywrap as bindings
+
+    for name, item in vars(bindings).items():
+        if getattr(item, "__module__", None) == bindings.__name__ and not name.startswith("_"):
+            # eigenpy adds two functions of its own.
+            assert name in dynacom.__all__ or name in ("seed", "sharedMemory"), name
+            assert name not in dynacom.__all__ or getattr(dynacom, name) is item
+
+
+@pytest.mark.parametrize("item", BINDINGS, ids=lambda item: getattr(item, "__name__", "function"))
+def test_classes_and_functions_have_docstrings(item):
+    assert all(documentation(item))
+
+
+@pytest.mark.parametrize(
+    ("cls", "name"), [(cls, name) for cls in CLASSES for name, _ in members(cls)]
+)
+def test_methods_and_properties_have_docstrings(cls, name):
+    """Of every overload: the signature that Boost.Python writes says nothing of units."""
+    docs = documentation(vars(cls)[name])
+    assert docs
+    assert all(docs)
+
+
+HEADERS = {
+    "contact_base.hpp": ("ContactBase",),
+    "contact_point.hpp": ("ContactPointSettings", "ContactPoint"),
+    "contact6d.hpp": ("Contact6DSettings", "Contact6D"),
+    "wrench_distribution.hpp": ("WrenchDistribution",),
+    "dyna_com.hpp": ("DynaCoMSettings", "DynaCoM"),
+}
+
+
+def header_signatures(root: Path, header: str, cls: str) -> dict[str, set[tuple]]:
+    """Of a class's public methods: name -> its overloads, each ((parameter, has default), ...)."""
+    text = (root / "include/dynacom" / header).read_text(encoding="utf-8")
+    text = re.sub(r"//.*", "", text)
+    declaration = rf"(?:class|struct) DYNACOM_EXPORT {cls}\b[^;{{]*\{{(.*?)\n\}};"
+    body = re.split(r"\n (?:protected|private):", re.search(declaration, text, re.S)[1])[0]
+    body = re.sub(r"\{[^{}]*\}", ";", body)
+    signatures: dict[str, set[tuple]] = {}
+    pattern = r"(?<![\w~.:>])(\w+)\(((?:[^()]|\([^()]*\))*)\)\s*(?:const)?\s*(?:override)?\s*[;{=]"
+    for name, parameters in re.findall(pattern, body):
+        # Commas between <> do not separate parameters.
+        while (flat := re.sub(r"<[^<>]*>", "", parameters)) != parameters:
+            parameters = flat
+        parts = [part for part in parameters.split(",") if part.strip()]
+        parsed = tuple((re.findall(r"\w+", part.split("=")[0])[-1], "=" in part) for part in parts)
+        signatures.setdefault(name, set()).add(parsed)
+    signatures.pop(cls, None)
+    return signatures
+
+
+def python_signatures(method: object) -> set[tuple]:
+    """The same, from what Boost.Python says of itself."""
+    overloads = set()
+    for text in re.findall(r"^\w+\((.*)\) ->", method.__doc__, re.M):
+        parameters = re.findall(r"\([\w.]+\)(\w+)(=?)", text)
+        overloads.add(tuple((name, bool(default)) for name, default in parameters[1:]))
+    return overloads
+
+
+@pytest.mark.parametrize(
+    ("header", "cls"), [(header, cls) for header, classes in HEADERS.items() for cls in classes]
+)
+def test_names_and_parameters_are_those_of_the_headers(root, header, cls):
+    """Every public method of C++ is there, with the same parameters and the same defaults."""
+    signatures = header_signatures(root, header, cls)
+    assert len(signatures) >= 2
+    for name, overloads in signatures.items():
+        assert python_signatures(getattr(getattr(dynacom, cls), name)) == overloads, name
