@@ -1047,7 +1047,7 @@ BOOST_AUTO_TEST_CASE(initialize_takes_another_robot_and_forgets_the_contacts) {
 
   // In the other robot, the frames of the same names have other indices and other places.
   Random random(61);
-  const auto other = standingRobot(random, stance(5));
+  const auto other = standingRobot(random, stance(8));
   BOOST_REQUIRE(other.getFrameId("sole0") != biped.model.getFrameId("sole0"));
   biped.dynacom.initialize(other);
   BOOST_TEST(biped.dynacom.getKnownContacts().empty());
