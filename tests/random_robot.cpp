@@ -62,6 +62,7 @@ pinocchio::Model randomTree(Random& random, int joints) {
     joint = model.addJoint(parent, randomJoint(random), random.placement(0.5),
                            "joint" + std::to_string(i));
     model.appendBodyToJoint(joint, randomInertia(random), SE3::Identity());
+    model.addJointFrame(joint);
   }
   return model;
 }

@@ -194,6 +194,25 @@ bool isZero(const VectorXd& forces) { return (forces.array() == 0.).all(); }
 /// Left and right sole, the CoM between them on the ground.
 Contacts twoSoles() { return {makeSole({0., 0.1, 0.}), makeSole({0., -0.1, 0.})}; }
 
+/// A contact of a kind that the library does not know: a magnet, which holds against a pull.
+class Magnet : public ContactBase {
+ public:
+  Magnet(const Vector3d& position, double pull) {
+    reset(1, 4, 6);
+    uni_A_ << 0, 0, -1, 0, 0, 0;
+    uni_b_ << pull;
+    fri_A_.topLeftCorner<4, 2>() << 1, 0, 0, 1, -1, 0, 0, -1;
+    fri_b_.setConstant(pull / 2.);
+    reg_A_.setOnes();
+    updateNewtonEuler(Vector3d::Zero(), SE3(Matrix3d::Identity(), position));
+  }
+  std::shared_ptr<ContactBase> clone() const override { return std::make_shared<Magnet>(*this); }
+  const std::string& getFrameName() const override { return name_; }
+
+ private:
+  std::string name_ = "magnet";
+};
+
 Vector6 wrench(double fx, double fy, double fz, double tx = 0., double ty = 0., double tz = 0.) {
   return (Vector6() << fx, fy, fz, tx, ty, tz).finished();
 }
@@ -328,7 +347,7 @@ BOOST_AUTO_TEST_CASE(the_order_of_contacts_changes_nothing) {
     for (const auto& contact : contacts) {
       end -= contact->cols();
       BOOST_TEST(close(backward.forces().segment(end, contact->cols()),
-                       forward.forces().segment(col, contact->cols()), 1e-7));
+                       forward.forces().segment(col, contact->cols()), 1e-9));
       col += contact->cols();
     }
   }
@@ -365,6 +384,21 @@ BOOST_AUTO_TEST_CASE(what_the_ground_cannot_give_is_infeasible) {
   }
   // Lateral force without any load.
   infeasible(wrench(10., 0., 0.));
+}
+
+BOOST_AUTO_TEST_CASE(any_contact_is_taken_with_its_own_inequalities) {
+  // Their right-hand sides included: two magnets of 50 N hold 100 N, and 25 N aside each.
+  const Contacts magnets = {std::make_shared<Magnet>(Vector3d(0., 0.1, 0.), 50.),
+                            std::make_shared<Magnet>(Vector3d(0., -0.1, 0.), 50.)};
+  WrenchDistribution distribution;
+  for (const double size : {99., 101.}) {
+    const auto expected = size < 100. ? DistributionStatus::Solved : DistributionStatus::Infeasible;
+    BOOST_TEST(solve(distribution, magnets, wrench(0., 0., -size)) == expected);
+    BOOST_TEST(solve(distribution, magnets, wrench(size / 2., 0., 0.)) == expected);
+    BOOST_TEST(solve(distribution, magnets, wrench(0., -size / 2., 500.)) == expected);
+  }
+  BOOST_TEST(solve(distribution, magnets, wrench(0., 0., -80.)) == DistributionStatus::Solved);
+  BOOST_TEST(close(distribution.forces()[2], -40., 1e-10));
 }
 
 BOOST_AUTO_TEST_CASE(no_force_is_asked_and_none_is_given) {

@@ -446,6 +446,14 @@ def test_omega_out_of_range(robot, omega):
     assert_same(state(robot), before)
 
 
+def test_computeNL_of_a_motion_changes_nothing_when_it_throws(robot):
+    robot.computeNL(3.0, *motion(robot.getModel(), 0))
+    before = state(robot)
+    with pytest.raises(ValueError, match="omega must be > 0 rad/s, got 0"):
+        robot.computeNL(0, *motion(robot.getModel(), 1))
+    assert_same(state(robot), before)
+
+
 @pytest.mark.parametrize("height", [np.nan, np.inf, -np.inf])
 def test_ground_height_out_of_range(robot, height):
     robot.setGroundHeight(-0.5)
@@ -780,12 +788,31 @@ def test_contact_of_another_frame_on_the_next_call(robot):
     pose = expected.oMf[contact.getFrameID()]
     assert_allclose(contact.getPose().homogeneous, pose.homogeneous, rtol=0, atol=1e-14)
 
+
+def test_contact_whose_frame_is_gone(robot):
+    """Nothing has changed when it throws, and the robot works again once the contact is right."""
+    model = robot.getModel()
+    robot.computeNL(3.0, *motion(model, 0))
+    assert distribute(robot) == SOLVED
+    contact = robot.getContact("b")
+    settings = contact.getSettings()
+    right = settings.frame_name
     settings.frame_name = "nowhere"
     contact.initialize(settings)
-    with pytest.raises(ValueError, match="no frame 'nowhere'"):
-        distribute(robot)
-    with pytest.raises(ValueError, match="no frame 'nowhere'"):
-        robot.computeDynamics(*motion(model, 0))
+    before = state(robot)
+    wrench = robot.getGroundCoMForce(), robot.getGroundCoMTorque()
+    for call in (
+        lambda: robot.computeDynamics(*motion(model, 1)),
+        lambda: robot.computeDynamics(*motion(model, 1), flatHorizontalGround=False),
+        lambda: robot.computeNL(4.0, *motion(model, 1)),
+        lambda: robot.distributeForce(*wrench, np.zeros(3)),
+    ):
+        with pytest.raises(ValueError, match="no frame 'nowhere'"):
+            call()
+        assert_same(state(robot), before)
+    settings.frame_name = right
+    contact.initialize(settings)
+    assert distribute(robot) == SOLVED
 
 
 # Copies.
@@ -1297,6 +1324,7 @@ def test_methods_and_properties_have_docstrings(cls, name):
 
 
 HEADERS = {
+    "centroidal.hpp": (),
     "contact_base.hpp": ("ContactBase",),
     "contact_point.hpp": ("ContactPointSettings", "ContactPoint"),
     "contact6d.hpp": ("Contact6DSettings", "Contact6D"),
@@ -1305,16 +1333,19 @@ HEADERS = {
 }
 
 
-def header_signatures(root: Path, header: str, cls: str) -> dict[str, set[tuple]]:
-    """Of a class's public methods: name -> its overloads, each ((parameter, has default), ...)."""
+def header_signatures(root: Path, header: str, cls: str | None) -> dict[str, set[tuple]]:
+    """Public methods or free functions: name -> overloads, each ((parameter, has default), …)."""
     text = (root / "include/dynacom" / header).read_text(encoding="utf-8")
     text = re.sub(r"//.*", "", text)
-    declaration = rf"(?:class|struct) DYNACOM_EXPORT {cls}\b[^;{{]*\{{(.*?)\n\}};"
-    body = re.split(r"\n (?:protected|private):", re.search(declaration, text, re.S)[1])[0]
-    body = re.sub(r"\{[^{}]*\}", ";", body)
+    if cls is None:
+        text = "\n".join(re.findall(r"^DYNACOM_EXPORT (?!std::ostream)[^;{]*;", text, re.M))
+    else:
+        declaration = rf"(?:class|struct) DYNACOM_EXPORT {cls}\b[^;{{]*\{{(.*?)\n\}};"
+        text = re.split(r"\n (?:protected|private):", re.search(declaration, text, re.S)[1])[0]
+        text = re.sub(r"\{[^{}]*\}", ";", text)
     signatures: dict[str, set[tuple]] = {}
     pattern = r"(?<![\w~.:>])(\w+)\(((?:[^()]|\([^()]*\))*)\)\s*(?:const)?\s*(?:override)?\s*[;{=]"
-    for name, parameters in re.findall(pattern, body):
+    for name, parameters in re.findall(pattern, text):
         # Commas between <> do not separate parameters.
         while (flat := re.sub(r"<[^<>]*>", "", parameters)) != parameters:
             parameters = flat
@@ -1325,21 +1356,23 @@ def header_signatures(root: Path, header: str, cls: str) -> dict[str, set[tuple]
     return signatures
 
 
-def python_signatures(method: object) -> set[tuple]:
-    """The same, from what Boost.Python says of itself."""
+def python_signatures(function: object) -> set[tuple]:
+    """The same, from what Boost.Python says of itself; methods have no self in C++."""
     overloads = set()
-    for text in re.findall(r"^\w+\((.*)\) ->", method.__doc__, re.M):
+    for text in re.findall(r"^\w+\((.*)\) ->", function.__doc__, re.M):
         parameters = re.findall(r"\([\w.]+\)(\w+)(=?)", text)
-        overloads.add(tuple((name, bool(default)) for name, default in parameters[1:]))
+        overloads.add(tuple((name, bool(value)) for name, value in parameters if name != "self"))
     return overloads
 
 
 @pytest.mark.parametrize(
-    ("header", "cls"), [(header, cls) for header, classes in HEADERS.items() for cls in classes]
+    ("header", "cls"),
+    [(header, cls) for header, classes in HEADERS.items() for cls in classes or (None,)],
 )
 def test_names_and_parameters_are_those_of_the_headers(root, header, cls):
-    """Every public method of C++ is there, with the same parameters and the same defaults."""
+    """All that C++ offers is there, with the same parameters and defaults for the same of them."""
     signatures = header_signatures(root, header, cls)
     assert len(signatures) >= 2
+    home = getattr(dynacom, cls) if cls else dynacom
     for name, overloads in signatures.items():
-        assert python_signatures(getattr(getattr(dynacom, cls), name)) == overloads, name
+        assert python_signatures(getattr(home, name)) == overloads, name

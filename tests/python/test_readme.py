@@ -44,7 +44,7 @@ def test_cmake():
     assert re.search(re.escape(link).replace("main", r"\w+"), consumer)
 
 
-@pytest.mark.parametrize("command", commands())
+@pytest.mark.parametrize("command", list(commands()))
 def test_command(command, tmp_path):
     if command == "scripts/test":
         # This runs in it; so does CI.

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: BSD-2-Clause
+// In a control loop nothing allocates. Eigen's own check for that does not see into libraries, so
+// this counts at malloc: a function of that name in the executable takes the place of the C
+// library's for all shared libraries, too, and operator new ends there.
+#define BOOST_TEST_MODULE allocation
+#include <atomic>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+
+#include "dynacom/contact6d.hpp"
+#include "dynacom/contact_point.hpp"
+#include "dynacom/dyna_com.hpp"
+#include "random_robot.hpp"
+
+namespace {
+
+std::atomic<bool> counting{false};
+std::atomic<int> allocations{0};
+
+void count() {
+  if (counting) ++allocations;
+}
+
+}  // namespace
+
+// Those of the GNU C library, under the names that it keeps for this purpose.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t number, std::size_t size);
+void* __libc_realloc(void* pointer, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+#define VISIBLE __attribute__((visibility("default")))
+
+VISIBLE void* malloc(std::size_t size) noexcept {
+  count();
+  return __libc_malloc(size);
+}
+
+VISIBLE void* calloc(std::size_t number, std::size_t size) noexcept {
+  count();
+  return __libc_calloc(number, size);
+}
+
+VISIBLE void* realloc(void* pointer, std::size_t size) noexcept {
+  count();
+  return __libc_realloc(pointer, size);
+}
+
+VISIBLE void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
+  count();
+  return __libc_memalign(alignment, size);
+}
+
+VISIBLE void* memalign(std::size_t alignment, std::size_t size) noexcept {
+  count();
+  return __libc_memalign(alignment, size);
+}
+
+VISIBLE int posix_memalign(void** pointer, std::size_t alignment, std::size_t size) noexcept {
+  count();
+  *pointer = __libc_memalign(alignment, size);
+  return *pointer ? 0 : ENOMEM;
+}
+}
+
+using namespace dynacom;
+using namespace dynacom_tests;
+
+namespace {
+
+template <class Action>
+int allocationsIn(Action action) {
+  allocations = 0;
+  counting = true;
+  action();
+  counting = false;
+  return allocations;
+}
+
+/// A robot on two soles or four points, with contacts that are known but take no part.
+struct Standing {
+  explicit Standing(bool onPoints)
+      : random(1), model(standingRobot(random, stance(onPoints ? 4 : 2))), dynacom(model) {
+    for (int i = 0; i < (onPoints ? 4 : 2); ++i) {
+      const std::string frame = "sole" + std::to_string(i);
+      for (const bool active : {true, false}) {
+        std::shared_ptr<ContactBase> contact;
+        if (onPoints) {
+          ContactPointSettings settings;
+          settings.mu = 0.7;
+          settings.frame_name = frame;
+          settings.world_aligned = i % 2 == 0;
+          settings.radius = 0.01;
+          contact = std::make_shared<ContactPoint>(settings);
+        } else {
+          Contact6DSettings settings;
+          settings.mu = 0.7;
+          settings.gu = 0.1;
+          settings.half_length = 0.1;
+          settings.half_width = 0.06;
+          settings.frame_name = frame;
+          contact = std::make_shared<Contact6D>(settings);
+        }
+        dynacom.addContact(contact, frame + (active ? "" : " idle"), active);
+      }
+    }
+    warmUp();
+  }
+
+  State moving() { return randomState(model, random, 0.02); }
+
+  /// One call, in which everything takes its size.
+  void warmUp() {
+    const State x = moving();
+    dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
+  }
+
+  DistributionStatus distribute() {
+    return dynacom.distributeForce(dynacom.getGroundCoMForce(), dynacom.getGroundCoMTorque(),
+                                   dynacom.getCoM());
+  }
+
+  Random random;
+  pinocchio::Model model;
+  DynaCoM dynacom;
+};
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(the_counter_sees_into_libraries) {
+  Standing standing(false);
+  DynaCoM& dynacom = standing.dynacom;
+  // Functions of the shared library, of which each has to allocate: a std::vector of std::string,
+  // an Eigen matrix, a contact.
+  BOOST_TEST(allocationsIn([&] { dynacom.getActiveContacts(); }) > 0);
+  BOOST_TEST(allocationsIn([&] { dynacom.uni_A(); }) > 0);
+  BOOST_TEST(allocationsIn([&] { dynacom.getContact("sole0")->clone(); }) > 0);
+  // And of Pinocchio's.
+  BOOST_TEST(allocationsIn([&] { pinocchio::Data data(dynacom.getModel()); }) > 10);
+  // In the executable, each way in.
+  void* volatile pointer = nullptr;
+  BOOST_TEST(allocationsIn([&] { pointer = std::malloc(8); }) == 1);
+  std::free(pointer);
+  BOOST_TEST(allocationsIn([&] { pointer = std::calloc(2, 8); }) == 1);
+  std::free(pointer);
+  BOOST_TEST(allocationsIn([&] { pointer = std::aligned_alloc(64, 64); }) == 1);
+  std::free(pointer);
+  BOOST_TEST(allocationsIn([&] { pointer = operator new(8); }) == 1);
+  operator delete(pointer);
+  BOOST_TEST(allocationsIn([&] { pointer = operator new(64, std::align_val_t(64)); }) == 1);
+  operator delete(pointer, std::align_val_t(64));
+  // And only while it is asked to.
+  const int before = allocations;
+  dynacom.getActiveContacts();
+  BOOST_TEST(allocations == before);
+}
+
+BOOST_AUTO_TEST_CASE(control_loop_allocates_nothing) {
+  for (const bool onPoints : {false, true}) {
+    Standing standing(onPoints);
+    DynaCoM& dynacom = standing.dynacom;
+    int solved = 0;
+    for (int trial = 0; trial < 20; ++trial) {
+      const State x = standing.moving();
+      const Vector6 external = standing.random.vector(6, 2.);
+      BOOST_TEST(allocationsIn([&] { dynacom.computeDynamics(x.q, x.v, x.a); }) == 0);
+      BOOST_TEST(allocationsIn([&] { dynacom.computeDynamics(x.q, x.v, x.a, external); }) == 0);
+      BOOST_TEST(allocationsIn([&] { dynacom.computeNL(3.); }) == 0);
+      auto status = DistributionStatus::NoContact;
+      BOOST_TEST(allocationsIn([&] { status = standing.distribute(); }) == 0);
+      BOOST_TEST(allocationsIn([&] { dynacom.computeDynamics(x.q, x.v, x.a, external, false); }) ==
+                 0);
+      BOOST_TEST(allocationsIn([&] { dynacom.computeNL(3., x.q, x.v, x.a, external, false); }) ==
+                 0);
+      if (status == DistributionStatus::Solved) ++solved;
+    }
+    BOOST_TEST(solved > 10);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(what_goes_wrong_in_the_world_allocates_nothing) {
+  for (const bool onPoints : {false, true}) {
+    Standing standing(onPoints);
+    DynaCoM& dynacom = standing.dynacom;
+    const Vector3d com = dynacom.getCoM();
+    auto status = DistributionStatus::Solved;
+    const auto distribute = [&](const Vector3d& force) {
+      return allocationsIn([&] { status = dynacom.distributeForce(force, Vector3d::Zero(), com); });
+    };
+    BOOST_TEST(distribute({0., 0., -500.}) == 0);
+    BOOST_TEST(status == DistributionStatus::Infeasible);
+    BOOST_TEST(distribute({0., 0., 0. / 0.}) == 0);
+    BOOST_TEST(status == DistributionStatus::NumericalFailure);
+    BOOST_TEST(distribute({0., 0., 0.}) == 0);
+
+    // No contact at all, after a first time without.
+    for (const auto& name : dynacom.getActiveContacts()) dynacom.deactivateContact(name);
+    standing.warmUp();
+    BOOST_TEST(distribute({0., 0., 500.}) == 0);
+    BOOST_TEST(status == DistributionStatus::NoContact);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(getters_that_return_references_allocate_nothing) {
+  Standing standing(false);
+  DynaCoM& dynacom = standing.dynacom;
+  const std::string name = "sole0";
+  double sum = 0.;
+  BOOST_TEST(allocationsIn([&] {
+               sum += dynacom.getMass() + dynacom.getGroundHeight() + dynacom.getCoM().x() +
+                      dynacom.getVCoM().x() + dynacom.getACoM().x() + dynacom.getAM().x() +
+                      dynacom.getAMVariation().x() + dynacom.getGroundCoMForce().x() +
+                      dynacom.getGroundCoMTorque().x() + dynacom.getCoP().x() +
+                      dynacom.getVRP().x() + dynacom.getNL().x() + dynacom.ne_b().x() +
+                      dynacom.getSettings().gravity.z() + dynacom.getModel().nq +
+                      dynacom.getData().com[0].x();
+               const ContactBase& contact = *dynacom.getContact(name);
+               sum += contact.appliedForce()[2] + contact.ne_A()(0, 0) + contact.uni_A()(0, 0) +
+                      contact.uni_b()[0] + contact.fri_A()(0, 0) + contact.fri_b()[0] +
+                      contact.reg_A()[0] + contact.reg_b()[0] + contact.getPose().translation().x();
+               // These are small enough to be returned on the stack.
+               sum += contact.toWorldForces().x() + contact.toCoMForces().x() +
+                      contact.getCoP().x() + contact.getSurfacePose().translation().x();
+             }) == 0);
+  BOOST_TEST(std::isfinite(sum));
+}
+
+BOOST_AUTO_TEST_CASE(what_dynacom_does_to_contacts_allocates_nothing) {
+  // A controller that has contacts of its own does it, too.
+  Standing standing(false);
+  auto& sole = dynamic_cast<Contact6D&>(*standing.dynacom.getContact("sole0"));
+  const Vector6 force = Vector6::Ones();
+  BOOST_TEST(allocationsIn([&] {
+               sole.applyForce(force);
+               sole.deactivate();
+               sole.updateNewtonEuler(Vector3d::Zero(), SE3::Identity());
+             }) == 0);
+}
+
+BOOST_AUTO_TEST_CASE(a_distribution_of_the_same_sizes_allocates_nothing) {
+  Standing standing(false);
+  const ContactBase& left = *standing.dynacom.getContact("sole0");
+  const ContactBase& right = *standing.dynacom.getContact("sole1");
+  const Vector6 wrench = left.ne_A().col(2) * 200. + right.ne_A().col(2) * 300.;
+  WrenchDistribution distribution;
+  auto status = DistributionStatus::NoContact;
+  const auto solve = [&](const ContactBase& first, const ContactBase& second) {
+    distribution.clear();
+    distribution.add(first);
+    distribution.add(second);
+    status = distribution.solve(wrench);
+  };
+  solve(left, right);
+  BOOST_TEST(allocationsIn([&] { solve(right, left); }) == 0);
+  BOOST_TEST(status == DistributionStatus::Solved);
+  BOOST_TEST(distribution.forces().size() == 12);
+}
