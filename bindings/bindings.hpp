@@ -4,6 +4,8 @@
 #include <eigenpy/eigenpy.hpp>
 #include <utility>
 
+#include "check.hpp"
+
 // What the bindings have in common. Vectors and matrices come in as any numpy array of numbers and
 // go out as copies; errors of C++ become those of Python, see module.cpp.
 
@@ -19,14 +21,40 @@ void exposeWrenchDistribution();
 void exposeDynaCoM();
 void exposeMotion();
 
-/// A property that hands out a copy of a member, and takes one if it may be written.
+/// A vector of a fixed size from an array. Boost.Python would refuse one of another size without
+/// naming it.
+template <int size>
+Eigen::Matrix<double, size, 1> toVector(const char* name, const Eigen::VectorXd& values) {
+  internal::requireSize(name, values.size(), Eigen::Index(size), "components");
+  return values;
+}
+
+/// A property that hands out a copy of a member.
 template <class Class, class Value>
 bp::object getter(Value Class::*member) {
   return bp::make_getter(member, bp::return_value_policy<bp::return_by_value>());
 }
-template <class Class, class Value>
-bp::object setter(Value Class::*member) {
-  return bp::make_setter(member, bp::default_call_policies());
+
+/// A property that takes a vector.
+template <class Class, int size>
+bp::object setter(Eigen::Matrix<double, size, 1> Class::*member, const char* name) {
+  return bp::make_function(
+      [member, name](Class& self, const Eigen::VectorXd& values) {
+        self.*member = toVector<size>(name, values);
+      },
+      bp::default_call_policies(), boost::mpl::vector3<void, Class&, const Eigen::VectorXd&>());
+}
+
+/// A method that takes a vector and nothing else.
+template <class Class, class Result, int size>
+bp::object method(Result (Class::*member)(const Eigen::Matrix<double, size, 1>&),
+                  const char* name) {
+  return bp::make_function(
+      [member, name](Class& self, const Eigen::VectorXd& values) {
+        return (self.*member)(toVector<size>(name, values));
+      },
+      bp::default_call_policies(), (bp::arg("self"), bp::arg(name)),
+      boost::mpl::vector3<Result, Class&, const Eigen::VectorXd&>());
 }
 
 /// A matrix as an array with two dimensions: a matrix of one row or column would have only one.
@@ -68,7 +96,7 @@ struct SettingsVisitor : bp::def_visitor<SettingsVisitor<Settings>> {
         .def(bp::self != bp::self)
         .def("validate", &Settings::validate, bp::arg("self"),
              "Raises ValueError, naming the first field out of its range.")
-        .def("to_string", &Settings::to_string, bp::arg("self"))
+        .def("to_string", &Settings::to_string, bp::arg("self"), "Names and values of the fields.")
         .def("__str__", &Settings::to_string, bp::arg("self"))
         .def("__repr__", &Settings::to_string, bp::arg("self"))
         .def(CopyVisitor<Settings>());

@@ -4,29 +4,43 @@
 
 namespace dynacom::python {
 
+namespace {
+
+CentroidalWrench groundWrench(const CentroidalState& state, const Eigen::VectorXd& gravity,
+                              const Eigen::VectorXd& ext_wrench) {
+  return computeGroundWrench(state, toVector<3>("gravity", gravity),
+                             toVector<6>("extWrench", ext_wrench));
+}
+
+Eigen::Vector2d flatGroundCoP(const CentroidalWrench& wrench, const Eigen::VectorXd& com,
+                              double ground_height) {
+  return computeFlatGroundCoP(wrench, toVector<3>("com", com), ground_height);
+}
+
+}  // namespace
+
 void exposeCentroidal() {
-  using Vector6 = Eigen::Matrix<double, 6, 1>;
   bp::class_<CentroidalState>(
       "CentroidalState",
       "Motion of the centre of mass c, and momentum about it, in the world's axes.", bp::init<>())
       .def_readwrite("mass", &CentroidalState::mass, "m [kg]")
-      .add_property("com", getter(&CentroidalState::com), setter(&CentroidalState::com),
+      .add_property("com", getter(&CentroidalState::com), setter(&CentroidalState::com, "com"),
                     "c, (3,), world [m]")
-      .add_property("vcom", getter(&CentroidalState::vcom), setter(&CentroidalState::vcom),
+      .add_property("vcom", getter(&CentroidalState::vcom), setter(&CentroidalState::vcom, "vcom"),
                     "dc/dt, (3,) [m/s]")
-      .add_property("acom", getter(&CentroidalState::acom), setter(&CentroidalState::acom),
+      .add_property("acom", getter(&CentroidalState::acom), setter(&CentroidalState::acom, "acom"),
                     "d²c/dt², (3,), without gravity [m/s²]")
-      .add_property("am", getter(&CentroidalState::am), setter(&CentroidalState::am),
+      .add_property("am", getter(&CentroidalState::am), setter(&CentroidalState::am, "am"),
                     "L, angular momentum about c, (3,) [kg·m²/s]")
       .add_property("amVariation", getter(&CentroidalState::amVariation),
-                    setter(&CentroidalState::amVariation), "dL/dt, (3,) [N·m]");
+                    setter(&CentroidalState::amVariation, "amVariation"), "dL/dt, (3,) [N·m]");
 
   bp::class_<CentroidalWrench>(
       "CentroidalWrench", "A wrench about the centre of mass, in the world's axes.", bp::init<>())
-      .add_property("force", getter(&CentroidalWrench::force), setter(&CentroidalWrench::force),
-                    "f, (3,) [N]")
-      .add_property("torque", getter(&CentroidalWrench::torque), setter(&CentroidalWrench::torque),
-                    "tau about c, (3,) [N·m]");
+      .add_property("force", getter(&CentroidalWrench::force),
+                    setter(&CentroidalWrench::force, "force"), "f, (3,) [N]")
+      .add_property("torque", getter(&CentroidalWrench::torque),
+                    setter(&CentroidalWrench::torque, "torque"), "tau about c, (3,) [N·m]");
 
   bp::def("computeCentroidalState", &computeCentroidalState,
           (bp::arg("model"), bp::arg("data"), bp::arg("q"), bp::arg("v"), bp::arg("a")),
@@ -37,12 +51,13 @@ void exposeCentroidal() {
   bp::def("readCentroidalState", &readCentroidalState, bp::arg("data"),
           "The centroidal state found in data, in which\n"
           "pinocchio.computeCentroidalMomentumTimeVariation(model, data, q, v, a) has run.");
-  bp::def("computeGroundWrench", &computeGroundWrench,
-          (bp::arg("state"), bp::arg("gravity"), bp::arg("extWrench") = Vector6(Vector6::Zero())),
+  bp::def("computeGroundWrench", &groundWrench,
+          (bp::arg("state"), bp::arg("gravity"),
+           bp::arg("extWrench") = Eigen::VectorXd(Eigen::VectorXd::Zero(6))),
           "Newton and Euler, equations (1, 2): the wrench about c that the ground must give,\n"
           "f = m (d²c/dt² - g) - f_e and tau = dL/dt - tau_e.\n\n"
           "gravity: (3,), world [m/s²]; extWrench: (6,), force [N] and moment [N·m] about c.");
-  bp::def("computeFlatGroundCoP", &computeFlatGroundCoP,
+  bp::def("computeFlatGroundCoP", &flatGroundCoP,
           (bp::arg("groundWrench"), bp::arg("com"), bp::arg("groundHeight") = 0.),
           "Centre of pressure on flat horizontal ground, equation (5), (2,), world [m]; NaN where\n"
           "the vertical force is below 1 N.");

@@ -13,7 +13,7 @@ void exposeContact6D() {
       .def_readwrite("gu", &Settings::gu, "Yaw friction: |tau_z| <= gu f_z, >= 0 [m].")
       .def_readwrite("half_length", &Settings::half_length, "Half extent along x, >= 0 [m].")
       .def_readwrite("half_width", &Settings::half_width, "Half extent along y, >= 0 [m].")
-      .add_property("weights", getter(&Settings::weights), setter(&Settings::weights),
+      .add_property("weights", getter(&Settings::weights), setter(&Settings::weights, "weights"),
                     "Weights of (force [1/N], moment [1/(N·m)]) in the cost, which squares them,\n"
                     "(6,), > 0.")
       .def_readwrite("frame_name", &Settings::frame_name,
@@ -32,12 +32,13 @@ void exposeContact6D() {
            "a setting is out of its range, and then nothing has changed.")
       .def("getSettings", &Contact6D::getSettings, bp::arg("self"), Copied(),
            "A copy of the settings.")
-      .def("setMu", &Contact6D::setMu, (bp::arg("self"), bp::arg("mu")))
-      .def("setGu", &Contact6D::setGu, (bp::arg("self"), bp::arg("gu")))
-      .def("setForceWeights", &Contact6D::setForceWeights,
-           (bp::arg("self"), bp::arg("force_weights")), "force_weights: (3,), > 0 [1/N].")
-      .def("setTorqueWeights", &Contact6D::setTorqueWeights,
-           (bp::arg("self"), bp::arg("torque_weights")), "torque_weights: (3,), > 0 [1/(N·m)].")
+      .def("setMu", &Contact6D::setMu, (bp::arg("self"), bp::arg("mu")),
+           "Friction coefficient, >= 0.")
+      .def("setGu", &Contact6D::setGu, (bp::arg("self"), bp::arg("gu")), "Yaw friction, >= 0 [m].")
+      .def("setForceWeights", method(&Contact6D::setForceWeights, "force_weights"),
+           "force_weights: (3,), > 0 [1/N].")
+      .def("setTorqueWeights", method(&Contact6D::setTorqueWeights, "torque_weights"),
+           "torque_weights: (3,), > 0 [1/(N·m)].")
       .def("setSurfaceHalfWidth", &Contact6D::setSurfaceHalfWidth,
            (bp::arg("self"), bp::arg("half_width")), "half_width: >= 0 [m].")
       .def("setSurfaceHalfLength", &Contact6D::setSurfaceHalfLength,

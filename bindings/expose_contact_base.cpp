@@ -10,6 +10,10 @@ std::shared_ptr<ContactBase> deepcopy(const ContactBase& self, const bp::dict&) 
   return self.clone();
 }
 
+void updateNewtonEuler(ContactBase& self, const Eigen::VectorXd& com, const pinocchio::SE3& oMs) {
+  self.updateNewtonEuler(toVector<3>("com", com), oMs);
+}
+
 }  // namespace
 
 void exposeContactBase() {
@@ -29,10 +33,12 @@ void exposeContactBase() {
            "Name of the contact's frame in the robot's model.")
       .def("getFrameID", &ContactBase::getFrameID, bp::arg("self"),
            "Index of that frame in a model; a very large number before DynaCoM.addContact.")
-      .def("setFrameID", &ContactBase::setFrameID, (bp::arg("self"), bp::arg("frame_id")))
+      .def("setFrameID", &ContactBase::setFrameID, (bp::arg("self"), bp::arg("frame_id")),
+           "Tells which frame of a model is the contact's. DynaCoM does.")
       .def("getPose", &ContactBase::getPose, bp::arg("self"), Copied(),
            "Placement of the contact's frame in the world (pinocchio.SE3).")
-      .def("setPose", &ContactBase::setPose, (bp::arg("self"), bp::arg("pose")))
+      .def("setPose", &ContactBase::setPose, (bp::arg("self"), bp::arg("pose")),
+           "Places the contact's frame in the world (pinocchio.SE3), and leaves ne_A as it is.")
       .def("getSurfacePose", &ContactBase::getSurfacePose, bp::arg("self"),
            "Placement of the surface in the world: getPose(), unless world_aligned or radius say\n"
            "otherwise.")
@@ -51,7 +57,7 @@ void exposeContactBase() {
       .def("ne_A", DYNACOM_MATRIX(ContactBase, ne_A), bp::arg("self"),
            "Newton-Euler matrix, (6, cols): takes lambda to (force, moment) about the centre of\n"
            "mass in the world's axes, at the last updateNewtonEuler.")
-      .def("updateNewtonEuler", &ContactBase::updateNewtonEuler,
+      .def("updateNewtonEuler", &updateNewtonEuler,
            (bp::arg("self"), bp::arg("com"), bp::arg("oMs")),
            "Sets the pose and brings ne_A up to date.\n\n"
            "com: (3,), world [m]; oMs: placement of the contact's frame (pinocchio.SE3).")

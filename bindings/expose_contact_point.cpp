@@ -10,7 +10,7 @@ void exposeContactPoint() {
                        "What describes a ContactPoint. The defaults describe a frictionless point.",
                        bp::init<>(bp::arg("self")))
       .def_readwrite("mu", &Settings::mu, "Friction coefficient, >= 0.")
-      .add_property("weights", getter(&Settings::weights), setter(&Settings::weights),
+      .add_property("weights", getter(&Settings::weights), setter(&Settings::weights, "weights"),
                     "Weights of (f_x, f_y, f_z) in the cost, which squares them, (3,), > 0 [1/N].")
       .def_readwrite("frame_name", &Settings::frame_name, "Name of the frame; not empty.")
       .def_readwrite("world_aligned", &Settings::world_aligned,
@@ -29,9 +29,10 @@ void exposeContactPoint() {
            "a setting is out of its range, and then nothing has changed.")
       .def("getSettings", &ContactPoint::getSettings, bp::arg("self"), Copied(),
            "A copy of the settings.")
-      .def("setMu", &ContactPoint::setMu, (bp::arg("self"), bp::arg("mu")))
-      .def("setForceWeights", &ContactPoint::setForceWeights,
-           (bp::arg("self"), bp::arg("force_weights")), "force_weights: (3,), > 0 [1/N].");
+      .def("setMu", &ContactPoint::setMu, (bp::arg("self"), bp::arg("mu")),
+           "Friction coefficient, >= 0.")
+      .def("setForceWeights", method(&ContactPoint::setForceWeights, "force_weights"),
+           "force_weights: (3,), > 0 [1/N].");
 }
 
 }  // namespace dynacom::python

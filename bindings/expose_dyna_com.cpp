@@ -19,18 +19,34 @@ std::shared_ptr<ContactBase> getContact(const DynaCoM& self, const std::string& 
   return self.getContact(name);
 }
 
+using VectorRef = DynaCoM::VectorRef;
+
+void computeDynamics(DynaCoM& self, const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                     const Eigen::VectorXd& ext_wrench, bool flat_horizontal_ground) {
+  self.computeDynamics(q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
+}
+
+void computeNL(DynaCoM& self, double omega, const VectorRef& q, const VectorRef& v,
+               const VectorRef& a, const Eigen::VectorXd& ext_wrench, bool flat_horizontal_ground) {
+  self.computeNL(omega, q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
+}
+
+DistributionStatus distributeForce(DynaCoM& self, const Eigen::VectorXd& force,
+                                   const Eigen::VectorXd& torque, const Eigen::VectorXd& com) {
+  return self.distributeForce(toVector<3>("groundCoMForce", force),
+                              toVector<3>("groundCoMTorque", torque), toVector<3>("com", com));
+}
+
 }  // namespace
 
 void exposeDynaCoM() {
-  using Vector6 = DynaCoM::Vector6;
-  using VectorRef = DynaCoM::VectorRef;
   using Settings = DynaCoMSettings;
-  const Vector6 no_wrench = Vector6::Zero();
+  const Eigen::VectorXd no_wrench = Eigen::VectorXd::Zero(6);
 
   bp::class_<Settings>("DynaCoMSettings", "What describes a DynaCoM.", bp::init<>(bp::arg("self")))
       .def_readwrite("urdf", &Settings::urdf,
                      "Path of a URDF file, or the XML itself. The root joint will be a free-flyer.")
-      .add_property("gravity", getter(&Settings::gravity), setter(&Settings::gravity),
+      .add_property("gravity", getter(&Settings::gravity), setter(&Settings::gravity, "gravity"),
                     "Along -z or zero, (3,) [m/s²]; (0, 0, -9.81) by default.")
       .def(SettingsVisitor<Settings>());
 
@@ -53,6 +69,8 @@ void exposeDynaCoM() {
       .def<void (DynaCoM::*)(const pinocchio::Model&)>(
           "initialize", &DynaCoM::initialize, (bp::arg("self"), bp::arg("model")),
           "The same for a pinocchio.Model, which is copied, with its gravity.")
+      .def("isInitialized", &DynaCoM::isInitialized, bp::arg("self"),
+           "Whether there is a robot: False before initialize().")
       .def("getSettings", &DynaCoM::getSettings, bp::arg("self"), Copied(),
            "A copy of the settings.")
       .def("getModel", &DynaCoM::getModel, bp::arg("self"), bp::return_internal_reference<>(),
@@ -64,9 +82,10 @@ void exposeDynaCoM() {
       .def("getMass", &DynaCoM::getMass, bp::arg("self"), "Mass of the robot [kg].")
       .def("getGroundHeight", &DynaCoM::getGroundHeight, bp::arg("self"),
            "Height of the flat horizontal ground [m].")
-      .def("setGroundHeight", &DynaCoM::setGroundHeight, (bp::arg("self"), bp::arg("groundHeight")))
+      .def("setGroundHeight", &DynaCoM::setGroundHeight, (bp::arg("self"), bp::arg("groundHeight")),
+           "Height of the flat horizontal ground, finite [m].")
 
-      .def("computeDynamics", &DynaCoM::computeDynamics,
+      .def("computeDynamics", &computeDynamics,
            (bp::arg("self"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
             bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
            "Computes the centroidal state, the ground wrench (1, 2), the placements of the\n"
@@ -92,12 +111,10 @@ void exposeDynaCoM() {
           "computeNL", &DynaCoM::computeNL, (bp::arg("self"), bp::arg("omega")),
           "Computes virtual repellent point and non-linearity, (7, 8), of the last\n"
           "computeDynamics. omega: > 0 [rad/s], else ValueError.")
-      .def<void (DynaCoM::*)(double, const VectorRef&, const VectorRef&, const VectorRef&,
-                             const Vector6&, bool)>(
-          "computeNL", &DynaCoM::computeNL,
-          (bp::arg("self"), bp::arg("omega"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
-           bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
-          "computeDynamics, then computeNL(omega).")
+      .def("computeNL", &computeNL,
+           (bp::arg("self"), bp::arg("omega"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
+            bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
+           "computeDynamics, then computeNL(omega).")
       .def("getVRP", &DynaCoM::getVRP, bp::arg("self"), Copied(),
            "Virtual repellent point, (2,) [m].")
       .def("getNL", &DynaCoM::getNL, bp::arg("self"), Copied(), "Non-linearity p - v, (2,) [m].")
@@ -131,7 +148,7 @@ void exposeDynaCoM() {
       .def("getKnownContacts", &getKnownContacts, bp::arg("self"),
            "Names of all contacts: the active ones, then the others.")
 
-      .def("distributeForce", &DynaCoM::distributeForce,
+      .def("distributeForce", &distributeForce,
            (bp::arg("self"), bp::arg("groundCoMForce"), bp::arg("groundCoMTorque"), bp::arg("com")),
            "Shares a wrench between the active contacts, placed by getData(): the cheapest forces\n"
            "within all inequalities that give it, (9-13). Each contact is given its force, zero\n"
@@ -142,12 +159,12 @@ void exposeDynaCoM() {
            "How the last distribution ended.")
       .def("uni_A", DYNACOM_MATRIX(DynaCoM, uni_A), bp::arg("self"),
            "Unilaterality of the active contacts, block-diagonal.")
-      .def("uni_b", &DynaCoM::uni_b, bp::arg("self"))
+      .def("uni_b", &DynaCoM::uni_b, bp::arg("self"), "Right-hand side of unilaterality, zero.")
       .def("fri_A", DYNACOM_MATRIX(DynaCoM, fri_A), bp::arg("self"),
            "Friction of the active contacts, block-diagonal.")
-      .def("fri_b", &DynaCoM::fri_b, bp::arg("self"))
+      .def("fri_b", &DynaCoM::fri_b, bp::arg("self"), "Right-hand side of friction, zero.")
       .def("reg_A", &DynaCoM::reg_A, bp::arg("self"), "Weights of the active contacts, stacked.")
-      .def("reg_b", &DynaCoM::reg_b, bp::arg("self"))
+      .def("reg_b", &DynaCoM::reg_b, bp::arg("self"), "What the cost pulls the forces to, zero.")
       .def("ne_A", DYNACOM_MATRIX(DynaCoM, ne_A), bp::arg("self"),
            "Newton-Euler matrices of the active contacts, side by side, (6, n).")
       .def("ne_b", &DynaCoM::ne_b, bp::arg("self"), Copied(),

@@ -52,8 +52,8 @@ struct Rows<member> {
   }
 };
 
-Schedule::Matrix getContactActive(const MotionAnalysis::Contact& contact) {
-  return contact.active.matrix();
+bp::object getContactActive(const MotionAnalysis::Contact& contact) {
+  return bp::object(Schedule::Matrix(contact.active.matrix())).attr("reshape")(-1);
 }
 
 // Runs without Python's lock, which progress takes for its call.
@@ -152,7 +152,7 @@ void exposeMotion() {
                         "Ground wrench minus what the contacts give, (T, 6)")
           .add_property("contacts", &getContacts, "A MotionAnalysis.Contact for each contact");
   bp::class_<Contact>("Contact", "What one contact does.", bp::no_init)
-      .def_readonly("name", &Contact::name)
+      .def_readonly("name", &Contact::name, "The name under which the robot knows it.")
       .add_property("active", &getContactActive, "(T,) of bool")
       .add_property("wrench", &Rows<&Contact::wrench>::get,
                     "(force, moment) in the surface's frame about its origin, (T, 6)")

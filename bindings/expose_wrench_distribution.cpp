@@ -5,7 +5,15 @@
 namespace dynacom::python {
 
 void exposeWrenchDistribution() {
-  bp::enum_<DistributionStatus>("DistributionStatus", "How a distribution ended.")
+  bp::enum_<DistributionStatus>("DistributionStatus",
+                                "How a distribution ended.\n\n"
+                                "Solved: the forces sum to the wrench, respect every inequality,\n"
+                                "and are the cheapest that do.\n"
+                                "Infeasible: no forces within the inequalities sum to it.\n"
+                                "NoContact: there is no contact to give a force.\n"
+                                "NumericalFailure: a number was not finite, the iterations were\n"
+                                "used up, or the answer did not pass the check.\n\n"
+                                "The forces are zero in all but the first.")
       .value("Solved", DistributionStatus::Solved)
       .value("Infeasible", DistributionStatus::Infeasible)
       .value("NoContact", DistributionStatus::NoContact)
@@ -20,7 +28,7 @@ void exposeWrenchDistribution() {
            "Begins a new problem, without contacts.")
       .def("add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact")),
            "Adds a contact with the matrices that it has now.")
-      .def("solve", &WrenchDistribution::solve, (bp::arg("self"), bp::arg("wrench")),
+      .def("solve", method(&WrenchDistribution::solve, "wrench"),
            "Solves for the forces that give a wrench, (6,): force [N], moment [N·m] about the\n"
            "centre of mass, world axes. Returns the DistributionStatus.")
       .def("forces", &WrenchDistribution::forces, bp::arg("self"), Copied(),

@@ -47,7 +47,7 @@ Eigen::Vector2d computeFlatGroundCoP(const CentroidalWrench& groundWrench,
 }
 
 Eigen::Vector2d computeVRP(const CentroidalState& state, double omega) {
-  if (!(omega > 0.)) internal::throwInvalid("omega must be > 0 rad/s, got ", omega);
+  internal::requireOmega(omega);
   return state.com.head<2>() - state.acom.head<2>() / (omega * omega);  // (7)
 }
 

@@ -31,11 +31,15 @@ void requireField(bool holds, const char* field, const char* expected, const Val
   if (!holds) throwInvalid(field, " must be ", expected, ", got ", value);
 }
 
+/// Refuses a natural frequency of the linear inverted pendulum.
+inline void requireOmega(double omega) {
+  if (!(omega > 0.)) throwInvalid("omega must be > 0 rad/s, got ", omega);
+}
+
 /// Refuses a vector or matrix of the wrong size.
 template <class Index>
 void requireSize(const char* name, Index size, Index expected, const char* unit) {
-  if (size != expected)
-    throwInvalid(name, " must have ", expected, " ", unit, ", got ", size);
+  if (size != expected) throwInvalid(name, " must have ", expected, " ", unit, ", got ", size);
 }
 
 }  // namespace dynacom::internal

@@ -89,7 +89,7 @@ void DynaCoM::forgetMotion() {
 }
 
 void DynaCoM::requireInitialized() const {
-  if (mass_ == 0.) throw NotReadyError("DynaCoM is used before initialize()");
+  if (!isInitialized()) throw NotReadyError("DynaCoM is used before initialize()");
 }
 
 bool DynaCoM::hasMotion() const { return !std::isnan(state_.mass); }
@@ -102,6 +102,7 @@ void DynaCoM::setGroundHeight(double groundHeight) {
 void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
                               const Vector6& extWrench, bool flatHorizontalGround) {
   requireInitialized();
+  requireFrames();
   state_ = computeCentroidalState(model_, data_, q, v, a);
   ground_wrench_ = computeGroundWrench(state_, settings_.gravity, extWrench);
   for (const Entry& entry : contacts_) place(*entry.contact, state_.com);
@@ -123,6 +124,7 @@ void DynaCoM::computeNL(double omega) {
 
 void DynaCoM::computeNL(double omega, const VectorRef& q, const VectorRef& v, const VectorRef& a,
                         const Vector6& extWrench, bool flatHorizontalGround) {
+  internal::requireOmega(omega);  // before anything changes
   computeDynamics(q, v, a, extWrench, flatHorizontalGround);
   computeNL(omega);
 }
@@ -199,10 +201,18 @@ pinocchio::FrameIndex DynaCoM::findFrame(const ContactBase& contact) const {
   return model_.getFrameId(contact.getFrameName());
 }
 
+// Refuses contacts that cannot be placed, before anything changes.
+void DynaCoM::requireFrames() const {
+  for (const Entry& entry : contacts_) findFrame(*entry.contact);
+}
+
 // Places a contact where its frame is. By oMi, which every kinematic algorithm of Pinocchio leaves
 // in data.
 void DynaCoM::place(ContactBase& contact, const Eigen::Vector3d& com) {
   contact.setFrameID(findFrame(contact));
+  // Frames may have been added to the model behind a reference to it, which data does not know.
+  if (data_.oMf.size() < model_.frames.size())
+    data_.oMf.resize(model_.frames.size(), pinocchio::SE3::Identity());
   contact.updateNewtonEuler(com,
                             pinocchio::updateFramePlacement(model_, data_, contact.getFrameID()));
 }
@@ -228,6 +238,7 @@ DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForc
                                             const Eigen::Vector3d& groundCoMTorque,
                                             const Eigen::Vector3d& com) {
   requireInitialized();
+  requireFrames();
   distribution_.clear();
   for (const Entry& entry : contacts_) {
     if (!entry.active) break;

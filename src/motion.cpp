@@ -59,6 +59,7 @@ void ContactSchedule::validate(Eigen::Index frames) const {
 
 MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
                              const ContactSchedule& schedule, const AnalysisSettings& settings) {
+  if (!robot.isInitialized()) throw NotReadyError("analyzeMotion needs a robot: initialize() it");
   const Eigen::Index frames = motion.frames();
   motion.validate(robot.getModel());
   schedule.validate(frames);

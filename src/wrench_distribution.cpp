@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "dynacom/wrench_distribution.hpp"
 
-#include <eiquadprog/eiquadprog-fast.hpp>
 #include <ostream>
 #include <utility>
 #include <vector>
+
+#include "check.hpp"
+#include "minimum_norm.hpp"
 
 namespace dynacom {
 
 namespace {
 
-using eiquadprog::solvers::EIQUADPROG_FAST_INFEASIBLE;
-using eiquadprog::solvers::EIQUADPROG_FAST_OPTIMAL;
-using eiquadprog::solvers::EIQUADPROG_FAST_UNBOUNDED;
-using eiquadprog::solvers::EiquadprogFast;
+using internal::MinimumNorm;
 
-// How far an answer may be from its constraints, for a wrench of unit size. The solver's own
-// tolerance is about 1e-10.
-constexpr double kTolerance = 1e-8;
+// All for a wrench of unit size: by how much the solver may leave an inequality behind, and how far
+// an answer may be from its inequalities and from the wrench.
+constexpr double kTolerance = 1e-12;
+constexpr double kAccurateInequality = 1e-10;
+constexpr double kAccurateWrench = 1e-9;
 
 }  // namespace
 
@@ -53,20 +54,18 @@ struct WrenchDistribution::Workspace {
   std::size_t count = 0;
   Eigen::VectorXd forces;
 
-  // The problem as the solver wants it, and its answer. Its variable is y = W λ / ‖w‖, with W the
-  // weights over their largest: the cost's Hessian and the inverse of its root are the identity,
-  // and the solver's tolerances, which are absolute, mean the same for a mouse and for an elephant.
+  // The problem as the solver wants it. Its variable is x = W λ / ‖w‖, with W the weights over
+  // their largest: the cost becomes the norm of x, and tolerances mean the same for a mouse and for
+  // an elephant.
   Eigen::VectorXd inverse_weights;
-  Eigen::MatrixXd hessian, equalities, inequalities;
-  Eigen::VectorXd gradient, equalities_rhs, inequalities_rhs, y;
-  EiquadprogFast solver;
+  Eigen::MatrixXd E, G;               // columns: of NE W⁻¹, at unit length; of A W⁻¹
+  Eigen::Matrix<double, 6, 1> norms;  // of the columns of E before
+  Eigen::VectorXd d, h;
+  MinimumNorm solver;
 
   void assemble(const Eigen::Matrix<double, 6, 1>& wrench, double scale);
-  bool isAccurate() const;
 };
 
-// Brings the contacts into the solver's form: H = 1, equalities E y + e = 0, inequalities
-// I y + i ≥ 0.
 void WrenchDistribution::Workspace::assemble(const Eigen::Matrix<double, 6, 1>& wrench,
                                              double scale) {
   Eigen::Index n = 0, m = 0;
@@ -76,44 +75,31 @@ void WrenchDistribution::Workspace::assemble(const Eigen::Matrix<double, 6, 1>& 
     m += contacts[k].A.rows();
     largest_weight = std::max(largest_weight, contacts[k].weights.maxCoeff());
   }
-  if (n != gradient.size() || m != inequalities_rhs.size()) {
-    solver.reset(n, 6, m);
-    solver.is_inverse_provided_ = true;
-    hessian.setIdentity(n, n);
-    gradient.setZero(n);
-    equalities.resize(6, n);
-    equalities_rhs.resize(6);
-    inequalities.resize(m, n);
-    inequalities_rhs.resize(m);
-    inverse_weights.resize(n);
-    y.resize(n);
-  }
-
-  inequalities.setZero();
+  inverse_weights.resize(n);
+  E.resize(n, 6);
+  G.setZero(n, m);
+  h.resize(m);
   Eigen::Index col = 0, row = 0;
   for (std::size_t k = 0; k < count; ++k) {
     const Contact& contact = contacts[k];
     const Eigen::Index cols = contact.A.cols(), rows = contact.A.rows();
-    inverse_weights.segment(col, cols) = largest_weight * contact.weights.cwiseInverse();
-    for (Eigen::Index j = 0; j < cols; ++j) {
-      equalities.col(col + j) = inverse_weights[col + j] * contact.NE.col(j);
-      inequalities.col(col + j).segment(row, rows) = -inverse_weights[col + j] * contact.A.col(j);
+    for (Eigen::Index i = 0; i < cols; ++i) {
+      const double inverse_weight = largest_weight / contact.weights[i];
+      inverse_weights[col + i] = inverse_weight;
+      E.row(col + i) = inverse_weight * contact.NE.col(i).transpose();
+      G.row(col + i).segment(row, rows) = inverse_weight * contact.A.col(i).transpose();
     }
-    inequalities_rhs.segment(row, rows) = contact.b / scale;
+    h.segment(row, rows) = contact.b / scale;
     col += cols;
     row += rows;
   }
-  equalities_rhs = -wrench / scale;
-}
-
-// Whether y is what the solver says it is. It takes nothing on trust: with dependent constraints
-// the solver has been seen to stop at a point that is not feasible.
-bool WrenchDistribution::Workspace::isAccurate() const {
-  for (Eigen::Index i = 0; i < 6; ++i)
-    if (!(std::abs(equalities.row(i).dot(y) + equalities_rhs[i]) <= kTolerance)) return false;
-  for (Eigen::Index i = 0; i < inequalities.rows(); ++i)
-    if (!(inequalities.row(i).dot(y) + inequalities_rhs[i] >= -kTolerance)) return false;
-  return true;
+  d = wrench / scale;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    norms[i] = E.col(i).norm();
+    if (norms[i] == 0.) norms[i] = 1.;  // a component that the contacts cannot give
+    E.col(i) /= norms[i];
+    d[i] /= norms[i];
+  }
 }
 
 WrenchDistribution::WrenchDistribution() : work_(std::make_unique<Workspace>()) {}
@@ -129,6 +115,7 @@ WrenchDistribution::~WrenchDistribution() = default;
 void WrenchDistribution::clear() { work_->count = 0; }
 
 void WrenchDistribution::add(const ContactBase& contact) {
+  if (contact.cols() == 0) internal::throwInvalid("a contact was never initialised");
   Workspace& work = *work_;
   if (work.count == work.contacts.size()) work.contacts.emplace_back();
   Workspace::Contact& added = work.contacts[work.count++];
@@ -149,27 +136,30 @@ DistributionStatus WrenchDistribution::solve(const Eigen::Matrix<double, 6, 1>& 
   work.forces.setZero(n);
   if (n == 0) return DistributionStatus::NoContact;
 
-  const double scale = wrench.norm();
+  if (!wrench.allFinite()) return DistributionStatus::NumericalFailure;
+  const double scale = wrench.stableNorm();
   if (scale == 0.) return DistributionStatus::Solved;
   work.assemble(wrench, scale);
-  if (!work.equalities.allFinite() || !work.equalities_rhs.allFinite())
-    return DistributionStatus::NumericalFailure;
+  if (!work.E.allFinite()) return DistributionStatus::NumericalFailure;
 
-  // The solver rotates its factor in place; every solve begins with the identity.
-  work.solver.m_J.setIdentity(n, n);
-  switch (work.solver.solve_quadprog(work.hessian, work.gradient, work.equalities,
-                                     work.equalities_rhs, work.inequalities, work.inequalities_rhs,
-                                     work.y)) {
-    case EIQUADPROG_FAST_OPTIMAL:
+  switch (work.solver.solve(work.E, work.d, work.G, work.h, kTolerance)) {
+    case MinimumNorm::Status::Solved:
       break;
-    case EIQUADPROG_FAST_INFEASIBLE:
-    case EIQUADPROG_FAST_UNBOUNDED:  // the dual's unboundedness, which is infeasibility
+    case MinimumNorm::Status::Infeasible:
       return DistributionStatus::Infeasible;
-    default:
+    case MinimumNorm::Status::IterationLimit:
       return DistributionStatus::NumericalFailure;
   }
-  if (!work.isAccurate()) return DistributionStatus::NumericalFailure;
-  work.forces = scale * work.inverse_weights.cwiseProduct(work.y);
+  // The solver leaves out equalities that depend on others; if they contradict them, no forces give
+  // the wrench.
+  const Eigen::VectorXd& x = work.solver.x();
+  for (Eigen::Index i = 0; i < 6; ++i)
+    if (!(std::abs(work.E.col(i).dot(x) - work.d[i]) * work.norms[i] <= kAccurateWrench))
+      return DistributionStatus::Infeasible;
+  for (Eigen::Index j = 0; j < work.G.cols(); ++j)
+    if (!(work.G.col(j).dot(x) - work.h[j] <= kAccurateInequality))
+      return DistributionStatus::NumericalFailure;
+  work.forces = scale * work.inverse_weights.cwiseProduct(x);
   return DistributionStatus::Solved;
 }
 

@@ -326,10 +326,15 @@ BOOST_AUTO_TEST_CASE(on_uneven_ground_pressure_is_the_mean_by_vertical_force) {
     std::vector<std::shared_ptr<ContactBase>> contacts;
     for (int i = 0; i < 5; ++i) {
       const std::string frame = "sole" + std::to_string(i);
-      if (i < 2)
+      if (i < 2) {
         contacts.push_back(makeSole(frame));
-      else
-        contacts.push_back(makePoint(frame));
+      } else {
+        // Ball feet, too, which touch the ground beside their frame's origin.
+        auto settings = makePoint(frame)->getSettings();
+        settings.world_aligned = random.coin();
+        settings.radius = random.uniform(0., 0.1);
+        contacts.push_back(std::make_shared<ContactPoint>(settings));
+      }
       dynacom.addContact(contacts.back(), frame);
     }
     State x = restState(model);
@@ -745,6 +750,8 @@ BOOST_AUTO_TEST_CASE(a_contact_that_moved_to_no_frame_is_refused_on_the_next_cal
   const State y = biped.moving();
   BOOST_TEST(throws<std::invalid_argument>([&] { compute(biped.dynacom, y); }, {"nowhere"}));
   BOOST_TEST(same(everythingSeen(biped.dynacom), before));
+  // Also where the contacts that have a frame would be placed anew.
+  runForwardKinematics(biped.dynacom.getModel(), biped.dynacom.getData(), y.q);
   BOOST_TEST(throws<std::invalid_argument>([&] { distribute(biped.dynacom); }, {"nowhere"}));
   BOOST_TEST(same(everythingSeen(biped.dynacom), before));
 

@@ -30,10 +30,11 @@ struct CentroidalWrench {
 /// @param v  velocity, model.nv
 /// @param a  acceleration, model.nv
 /// @throws std::invalid_argument if a vector has another size
-DYNACOM_EXPORT CentroidalState computeCentroidalState(const pinocchio::Model& model, pinocchio::Data& data,
-                                       const Eigen::Ref<const Eigen::VectorXd>& q,
-                                       const Eigen::Ref<const Eigen::VectorXd>& v,
-                                       const Eigen::Ref<const Eigen::VectorXd>& a);
+DYNACOM_EXPORT CentroidalState computeCentroidalState(const pinocchio::Model& model,
+                                                      pinocchio::Data& data,
+                                                      const Eigen::Ref<const Eigen::VectorXd>& q,
+                                                      const Eigen::Ref<const Eigen::VectorXd>& v,
+                                                      const Eigen::Ref<const Eigen::VectorXd>& a);
 
 /// The centroidal state found in data, in which
 /// pinocchio::computeCentroidalMomentumTimeVariation(model, data, q, v, a) has run before.
@@ -45,8 +46,9 @@ DYNACOM_EXPORT CentroidalState readCentroidalState(const pinocchio::Data& data);
 ///
 /// @param gravity    g, world [m/s²]
 /// @param extWrench  (f_e [N], τ_e [N·m]): what else acts on the robot, about c, world axes
-DYNACOM_EXPORT CentroidalWrench computeGroundWrench(const CentroidalState& state, const Eigen::Vector3d& gravity,
-                                     const Eigen::Matrix<double, 6, 1>& extWrench);
+DYNACOM_EXPORT CentroidalWrench computeGroundWrench(
+    const CentroidalState& state, const Eigen::Vector3d& gravity,
+    const Eigen::Matrix<double, 6, 1>& extWrench = Eigen::Matrix<double, 6, 1>::Zero());
 
 /// Below this vertical force a centre of pressure means nothing [N].
 constexpr double kMinimalVerticalForce = 1.;
@@ -60,7 +62,8 @@ constexpr double kMinimalVerticalForce = 1.;
 /// @param groundHeight  h, world [m]
 /// @return p, world [m]; NaN where f_z is below kMinimalVerticalForce
 DYNACOM_EXPORT Eigen::Vector2d computeFlatGroundCoP(const CentroidalWrench& groundWrench,
-                                     const Eigen::Vector3d& com, double groundHeight = 0.);
+                                                    const Eigen::Vector3d& com,
+                                                    double groundHeight = 0.);
 
 /// Virtual repellent point on the ground's plane, equation (7): v = c − c̈ / ω² [m].
 /// @param omega  ω > 0, natural frequency of the linear inverted pendulum [rad/s]

@@ -31,8 +31,8 @@ struct DYNACOM_EXPORT Contact6DSettings {
 
 DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const Contact6DSettings& settings);
 
-/// A rectangle that gives a wrench λ = (f_x, f_y, f_z, τ_x, τ_y, τ_z): it pushes, with its centre of
-/// pressure inside, within a friction pyramid and a bound on the yaw moment.
+/// A rectangle that gives a wrench λ = (f_x, f_y, f_z, τ_x, τ_y, τ_z): it pushes, with its centre
+/// of pressure inside, within a friction pyramid and a bound on the yaw moment.
 ///
 ///     U = [0 0 −1   0  0 0]      C = [ 1  0 −μ 0 0  0]      NE = [    R     0]
 ///         [0 0 −dx  0 −1 0]          [ 0  1 −μ 0 0  0]           [[p − c]×R R]

@@ -103,8 +103,8 @@ class DYNACOM_EXPORT ContactBase {
   /// The same, about the CoM of the last updateNewtonEuler().
   Vector6 toCoMForces() const { return ne_A_ * force_; }
 
-  /// Centre of pressure of the applied force, in the surface's plane (x, y of s) [m]; NaN unless the
-  /// normal force is positive.
+  /// Centre of pressure of the applied force, in the surface's plane (x, y of s) [m]; NaN unless
+  /// the normal force is positive.
   Eigen::Vector2d getCoP() const;
 
  protected:

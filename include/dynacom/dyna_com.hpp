@@ -48,7 +48,8 @@ class DYNACOM_EXPORT DynaCoM {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   using VectorRef = Eigen::Ref<const Eigen::VectorXd>;
 
-  /// A DynaCoM that waits for initialize(): all else throws NotReadyError until then.
+  /// A DynaCoM that waits for initialize(): until then it has no mass and no contacts, and neither
+  /// computes nor takes any (NotReadyError).
   DynaCoM();
   /// @throws std::invalid_argument as initialize(settings)
   explicit DynaCoM(const DynaCoMSettings& settings);
@@ -64,6 +65,9 @@ class DYNACOM_EXPORT DynaCoM {
   /// The same for a model, which is copied, with its gravity; the settings' urdf will be empty.
   /// @throws std::invalid_argument if gravity does not lie along −z, or the robot has no mass
   void initialize(const pinocchio::Model& model);
+
+  /// Whether there is a robot: false before initialize().
+  bool isInitialized() const { return mass_ > 0.; }
 
   const DynaCoMSettings& getSettings() const { return settings_; }
   const pinocchio::Model& getModel() const { return model_; }
@@ -201,6 +205,7 @@ class DYNACOM_EXPORT DynaCoM {
   std::vector<Entry>::iterator find(const std::string& name);
   std::vector<Entry>::iterator firstInactive();
   pinocchio::FrameIndex findFrame(const ContactBase& contact) const;
+  void requireFrames() const;
   void place(ContactBase& contact, const Eigen::Vector3d& com);
   Eigen::Vector2d computePressureCentre() const;
   template <class Rows, class Block>

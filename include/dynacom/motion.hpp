@@ -73,11 +73,14 @@ struct MotionAnalysis {
   std::vector<Contact> contacts;  ///< all that the robot knows, in its order
 };
 
-/// Computes dynamics and distribution for every frame of a motion. The robot given is left as it is.
-/// @throws std::invalid_argument if motion or schedule is not valid, or the schedule names a contact
-///         that the robot does not know; contacts without schedule are never active
+/// Computes dynamics and distribution for every frame of a motion. The robot given is left as it
+/// is.
+/// @throws std::invalid_argument if motion or schedule is not valid, or the schedule names a
+/// contact
+///         that the robot does not know; contacts without schedule are never active.
+///         NotReadyError before the robot's initialize()
 DYNACOM_EXPORT MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
-                             const ContactSchedule& schedule,
-                             const AnalysisSettings& settings = AnalysisSettings());
+                                            const ContactSchedule& schedule,
+                                            const AnalysisSettings& settings = AnalysisSettings());
 
 }  // namespace dynacom

@@ -17,8 +17,8 @@ enum class DistributionStatus {
   Infeasible,
   /// There is no contact to give a force.
   NoContact,
-  /// A number was not finite, the equalities depend on each other (fewer than three points), the
-  /// iterations were used up, or the solver's answer did not pass the check. The forces are zero.
+  /// A number was not finite, the iterations were used up, or the solver's answer did not pass the
+  /// check. The forces are zero.
   NumericalFailure,
 };
 
@@ -45,6 +45,7 @@ class DYNACOM_EXPORT WrenchDistribution {
 
   /// Adds a contact, with the matrices that it has now; its force takes the next cols() components
   /// of forces().
+  /// @throws std::invalid_argument if the contact was never initialised
   void add(const ContactBase& contact);
 
   /// Solves for the forces that give a wrench.

@@ -200,26 +200,34 @@ def nonnegative_least_squares(A: np.ndarray, b: np.ndarray) -> np.ndarray:
     """x >= 0 that minimises |A x - b|, by Lawson and Hanson's active sets."""
     x = np.zeros(A.shape[1])
     passive = np.zeros(A.shape[1], dtype=bool)
+    # Those that would enter by rounding alone, only to leave at once.
+    refused = np.zeros(A.shape[1], dtype=bool)
     for _ in range(10 * A.shape[1]):
-        gradient = A.T @ (b - A @ x)
-        gradient[passive] = -np.inf
-        if passive.all() or gradient.max() <= 1e-12:
+        gradient = np.where(passive | refused, -np.inf, A.T @ (b - A @ x))
+        entering = np.argmax(gradient)
+        if gradient[entering] <= 1e-12:
             return x
-        passive[np.argmax(gradient)] = True
-        while True:
-            trial = np.zeros_like(x)
-            trial[passive] = np.linalg.lstsq(A[:, passive], b, rcond=None)[0]
-            if trial[passive].min() > 0.0:
-                x = trial
-                break
+        passive[entering] = True
+        trial = _least_squares(A, b, passive)
+        if trial[entering] <= 0.0:
+            passive[entering], refused[entering] = False, True
+            continue
+        refused[:] = False
+        while trial[passive].min() <= 0.0:
             leaving = passive & (trial <= 0.0)
             step = np.min(x[leaving] / (x[leaving] - trial[leaving]))
-            x = x + step * (trial - x)
+            x = np.where(passive, x + step * (trial - x), 0.0)
             passive &= x > 1e-14
-            x[~passive] = 0.0
-            if not passive.any():
-                break
+            trial = _least_squares(A, b, passive)
+        x = trial
     raise RuntimeError("non-negative least squares did not end")
+
+
+def _least_squares(A: np.ndarray, b: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """x that minimises |A x - b| and is zero outside of some columns."""
+    x = np.zeros(A.shape[1])
+    x[columns] = np.linalg.lstsq(A[:, columns], b, rcond=None)[0]
+    return x
 
 
 def assert_within_cones(contact: dynacom.ContactBase, tolerance: float) -> None:

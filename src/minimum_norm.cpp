@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "minimum_norm.hpp"
+
+#include <Eigen/Jacobi>
+#include <algorithm>
+#include <limits>
+
+namespace dynacom::internal {
+
+namespace {
+
+// A normal whose part outside the span of others is shorter than this, relative to its length,
+// depends on them.
+constexpr double kDependent = 1e-11;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Far above what has been seen, 120 for 88 inequalities.
+int iterationLimit(Eigen::Index inequalities) { return 50 + 10 * static_cast<int>(inequalities); }
+
+}  // namespace
+
+MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& E,
+                                       const Eigen::Ref<const Eigen::VectorXd>& d,
+                                       const Eigen::Ref<const Eigen::MatrixXd>& G,
+                                       const Eigen::Ref<const Eigen::VectorXd>& h,
+                                       double tolerance) {
+  startWithEqualities(E, d);
+  int iterations = 0;
+  for (;;) {
+    const Eigen::Index violated = findViolated(G, h, tolerance);
+    if (violated < 0) return Status::Solved;
+    if (iterations == 0) {
+      J_.setIdentity();
+      for (Eigen::Index k = 0; k < J_.cols(); ++k) applyQ(J_.col(k));
+    }
+
+    double multiplier = 0.;
+    for (bool added = false; !added;) {
+      if (++iterations > iterationLimit(G.cols())) return Status::IterationLimit;
+      computeDirections(G.col(violated));
+      // The whole step reaches the inequality; on the way, the multiplier of an active one may
+      // reach zero.
+      const auto outside = Jn_.tail(Jn_.size() - q_);
+      double whole = kInfinity;
+      if (outside.squaredNorm() > kDependent * kDependent * Jn_.squaredNorm())
+        whole = (G.col(violated).dot(x_) - h[violated]) / outside.squaredNorm();
+      double partial = kInfinity;
+      Eigen::Index leaving = -1;
+      for (Eigen::Index k = equalities_; k < q_; ++k) {
+        if (r_[k] > 0. && u_[k] < partial * r_[k]) {
+          partial = u_[k] / r_[k];
+          leaving = k;
+        }
+      }
+      const double step = std::min(whole, partial);
+      // The inequality contradicts the active ones, and none of them can leave.
+      if (step == kInfinity) return Status::Infeasible;
+
+      if (whole < kInfinity) x_.noalias() -= step * (J_.rightCols(J_.cols() - q_) * outside);
+      u_.head(q_) -= step * r_.head(q_);
+      multiplier += step;
+      if (whole <= partial) {
+        activate(violated, h[violated], multiplier);
+        added = true;
+      } else {
+        leave(leaving);
+      }
+    }
+    // Steps pile up rounding; what follows from the active constraints does not.
+    computeSolution();
+  }
+}
+
+// x becomes the point of least norm under the equalities, of which only independent ones are kept.
+void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E,
+                                      const Eigen::Ref<const Eigen::VectorXd>& d) {
+  const Eigen::Index n = E.rows();
+  J_.resize(n, n);
+  R_.resize(n, n);
+  rhs_.resize(n);
+  x_.resize(n);
+  u_.resize(n);
+  Jn_.resize(n);
+  r_.resize(n);
+  active_.clear();
+  active_.reserve(n);
+
+  qr_.compute(E);
+  qr_.setThreshold(kDependent);
+  q_ = equalities_ = qr_.rank();
+  R_.topLeftCorner(q_, q_) = qr_.matrixQR().topLeftCorner(q_, q_);
+  for (Eigen::Index k = 0; k < q_; ++k) rhs_[k] = d[qr_.colsPermutation().indices()[k]];
+
+  // As computeSolution(), but without J, which many problems never need.
+  x_.setZero();
+  x_.head(q_) = rhs_.head(q_);
+  R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>().transpose().solveInPlace(x_.head(q_));
+  u_.head(q_) = -x_.head(q_);
+  R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>().solveInPlace(u_.head(q_));
+  applyQ(x_);
+}
+
+// Multiplies a vector by Q of the equalities' decomposition: Eigen's own way to do so allocates.
+void MinimumNorm::applyQ(Eigen::Ref<Eigen::VectorXd> vector) const {
+  for (Eigen::Index k = equalities_ - 1; k >= 0; --k) {
+    const Eigen::Index below = vector.size() - k - 1;
+    const auto reflector = qr_.matrixQR().col(k).tail(below);
+    const double scale = qr_.hCoeffs()[k] * (vector[k] + reflector.dot(vector.tail(below)));
+    vector[k] -= scale;
+    vector.tail(below) -= scale * reflector;
+  }
+}
+
+// The inequality that x violates most, or −1.
+Eigen::Index MinimumNorm::findViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
+                                       const Eigen::Ref<const Eigen::VectorXd>& h,
+                                       double tolerance) {
+  slack_ = -h;
+  slack_.noalias() += G.transpose() * x_;
+  for (const Eigen::Index inequality : active_) slack_[inequality] = -kInfinity;
+  Eigen::Index violated = -1;
+  if (slack_.size() == 0 || !(slack_.maxCoeff(&violated) > tolerance)) return -1;
+  return violated;
+}
+
+// The normal in the basis J, and what a step along it does to the active multipliers.
+void MinimumNorm::computeDirections(const Eigen::Ref<const Eigen::VectorXd>& normal) {
+  Jn_.noalias() = J_.transpose() * normal;
+  r_.head(q_) = Jn_.head(q_);
+  R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>().solveInPlace(r_.head(q_));
+}
+
+// Appends the inequality of computeDirections() to the active ones.
+void MinimumNorm::activate(Eigen::Index inequality, double rhs, double multiplier) {
+  // Rotations turn the part outside the active span into a single component.
+  for (Eigen::Index k = Jn_.size() - 1; k > q_; --k) {
+    if (Jn_[k] == 0.) continue;
+    Eigen::JacobiRotation<double> rotation;
+    rotation.makeGivens(Jn_[k - 1], Jn_[k], &Jn_[k - 1]);
+    J_.applyOnTheRight(k - 1, k, rotation);
+  }
+  R_.col(q_).head(q_ + 1) = Jn_.head(q_ + 1);
+  rhs_[q_] = rhs;
+  u_[q_] = multiplier;
+  active_.push_back(inequality);
+  ++q_;
+}
+
+// Takes the constraint at a position of R, an inequality, out of the active ones.
+void MinimumNorm::leave(Eigen::Index position) {
+  active_.erase(active_.begin() + (position - equalities_));
+  --q_;
+  for (Eigen::Index k = position; k < q_; ++k) {
+    R_.col(k).head(k + 2) = R_.col(k + 1).head(k + 2);
+    rhs_[k] = rhs_[k + 1];
+    u_[k] = u_[k + 1];
+  }
+  // Rotations make R triangular again.
+  for (Eigen::Index k = position; k < q_; ++k) {
+    Eigen::JacobiRotation<double> rotation;
+    rotation.makeGivens(R_(k, k), R_(k + 1, k), &R_(k, k));
+    R_.middleCols(k + 1, q_ - k - 1).applyOnTheLeft(k, k + 1, rotation.adjoint());
+    J_.applyOnTheRight(k, k + 1, rotation);
+  }
+}
+
+// Solution and multipliers, anew from the active constraints: x = J₁ R⁻ᵀ rhs, u = −R⁻¹ R⁻ᵀ rhs.
+void MinimumNorm::computeSolution() {
+  const auto R = R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>();
+  r_.head(q_) = rhs_.head(q_);
+  R.transpose().solveInPlace(r_.head(q_));
+  x_.noalias() = J_.leftCols(q_) * r_.head(q_);
+  u_.head(q_) = -r_.head(q_);
+  R.solveInPlace(u_.head(q_));
+}
+
+}  // namespace dynacom::internal

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/QR>
+#include <vector>
+
+namespace dynacom::internal {
+
+/// The point of least norm under linear constraints,
+///
+///     minimise ½ ‖x‖²   subject to   Eᵀ x = d,   Gᵀ x ≤ h
+///
+/// by the dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983): from
+/// the least point under the equalities alone, one violated inequality after the other is made
+/// active, and those whose multiplier would become negative on the way are left.
+///
+/// Equalities may depend on each other: those that follow from others are left out, and whether
+/// they hold is for the caller to see. Nothing is allocated once a problem of the same sizes was
+/// solved.
+class MinimumNorm {
+ public:
+  enum class Status { Solved, Infeasible, IterationLimit };
+
+  /// Solves the problem.
+  /// @param E, d       equalities, n × p and p; the columns of E have unit length
+  /// @param G, h       inequalities, n × m and m
+  /// @param tolerance  by how much Gᵀ x may exceed h
+  Status solve(const Eigen::Ref<const Eigen::MatrixXd>& E,
+               const Eigen::Ref<const Eigen::VectorXd>& d,
+               const Eigen::Ref<const Eigen::MatrixXd>& G,
+               const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance);
+
+  /// The solution, n.
+  const Eigen::VectorXd& x() const { return x_; }
+
+ private:
+  void startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E,
+                           const Eigen::Ref<const Eigen::VectorXd>& d);
+  void applyQ(Eigen::Ref<Eigen::VectorXd> vector) const;
+  Eigen::Index findViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
+                            const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance);
+  void computeDirections(const Eigen::Ref<const Eigen::VectorXd>& normal);
+  void activate(Eigen::Index inequality, double rhs, double multiplier);
+  void leave(Eigen::Index position);
+  void computeSolution();
+
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr_;  // of the equalities
+  // J is orthogonal. Its first q columns span the normals N of the active constraints, equalities
+  // first: N = J₁ R.
+  Eigen::MatrixXd J_, R_;
+  Eigen::Index q_ = 0, equalities_ = 0;
+  std::vector<Eigen::Index> active_;  // inequalities, in the order of R
+  Eigen::VectorXd rhs_;               // of the active constraints, in the order of R
+  Eigen::VectorXd x_;
+  Eigen::VectorXd u_;      // multipliers: x + N u = 0
+  Eigen::VectorXd Jn_;     // Jᵀ times the normal at hand
+  Eigen::VectorXd r_;      // minus the change of u for a unit of the new multiplier
+  Eigen::VectorXd slack_;  // Gᵀ x − h
+};
+
+}  // namespace dynacom::internal
