@@ -85,9 +85,12 @@ void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E
   active_.clear();
   active_.reserve(n);
 
-  qr_.compute(E);
-  qr_.setThreshold(kDependent);
-  q_ = equalities_ = qr_.rank();
+  q_ = equalities_ = 0;
+  if (E.cols() > 0) {  // Eigen's decomposition wants one
+    qr_.compute(E);
+    qr_.setThreshold(kDependent);
+    q_ = equalities_ = qr_.rank();
+  }
   R_.topLeftCorner(q_, q_) = qr_.matrixQR().topLeftCorner(q_, q_);
   for (Eigen::Index k = 0; k < q_; ++k) rhs_[k] = d[qr_.colsPermutation().indices()[k]];
 

@@ -59,7 +59,8 @@ void ContactSchedule::validate(Eigen::Index frames) const {
 
 MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
                              const ContactSchedule& schedule, const AnalysisSettings& settings) {
-  if (!robot.isInitialized()) throw NotReadyError("analyzeMotion needs a robot: initialize() it");
+  if (!robot.isInitialized())
+    throw NotReadyError("DynaCoM is used by analyzeMotion before initialize()");
   const Eigen::Index frames = motion.frames();
   motion.validate(robot.getModel());
   schedule.validate(frames);

@@ -166,6 +166,11 @@ BOOST_AUTO_TEST_CASE(ground_wrench_by_hand) {
   const auto wrench = computeGroundWrench(state, Vector3d(0., 0., -10.), external);
   BOOST_TEST(close(wrench.force, Vector3d(10. * 0.5 - 1., 10. * -1. - 2., 10. * 12. - 3.)));
   BOOST_TEST(close(wrench.torque, Vector3d(2., 2., 2.)));
+
+  // Without an external wrench.
+  const auto free = computeGroundWrench(state, Vector3d(0., 0., -10.));
+  BOOST_TEST(close(free.force, Vector3d(5., -10., 120.)));
+  BOOST_TEST(close(free.torque, Vector3d(6., 7., 8.)));
 }
 
 BOOST_AUTO_TEST_CASE(at_rest_the_ground_carries_the_weight_below_the_com) {

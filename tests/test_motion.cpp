@@ -330,5 +330,6 @@ BOOST_AUTO_TEST_CASE(an_omega_out_of_range_is_refused) {
 
 BOOST_AUTO_TEST_CASE(a_robot_that_was_never_initialised_is_refused) {
   const Walk walk(11);
-  BOOST_CHECK_THROW(analyzeMotion(DynaCoM(), walk.motion, walk.schedule), std::logic_error);
+  BOOST_TEST(throws<NotReadyError>([&] { analyzeMotion(DynaCoM(), walk.motion, walk.schedule); },
+                                   {"initialize"}));
 }

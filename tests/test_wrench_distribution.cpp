@@ -49,6 +49,16 @@ Matrix3d randomTilt(Random& random, double angle) {
   return Eigen::AngleAxisd(random.uniform(0., angle), random.rotation().col(0)).toRotationMatrix();
 }
 
+/// Zero, now and then: without friction or without extent, inequalities become degenerate.
+double sometimesZero(Random& random, double low, double high) {
+  return random.integer(0, 3) == 0 ? 0. : random.uniform(low, high);
+}
+
+/// Weights of which the largest is up to a hundred times the smallest.
+VectorXd randomWeights(Random& random, Index size) {
+  return Eigen::pow(10., random.vector(size).array());
+}
+
 /// At least three points, or a sole; tilted by up to 1 rad, with settings of every kind.
 Contacts randomContacts(Random& random) {
   const Index soles = random.integer(0, 3);
@@ -59,17 +69,17 @@ Contacts randomContacts(Random& random) {
     const SE3 pose(randomTilt(random, 1.), random.vector3(0.5));
     if (i < soles) {
       Contact6DSettings settings;
-      settings.mu = random.uniform(0.2, 1.);
-      settings.gu = random.uniform(0.02, 0.2);
-      settings.half_length = random.uniform(0.02, 0.2);
-      settings.half_width = random.uniform(0.02, 0.2);
-      settings.weights = random.vector(6, 0.3, 3.);
+      settings.mu = sometimesZero(random, 0.2, 1.);
+      settings.gu = sometimesZero(random, 0.02, 0.2);
+      settings.half_length = sometimesZero(random, 0.02, 0.2);
+      settings.half_width = sometimesZero(random, 0.02, 0.2);
+      settings.weights = randomWeights(random, 6);
       settings.frame_name = "sole";
       contacts.push_back(std::make_shared<Contact6D>(settings));
     } else {
       ContactPointSettings settings;
-      settings.mu = random.uniform(0.2, 1.);
-      settings.weights = random.vector(3, 0.3, 3.);
+      settings.mu = sometimesZero(random, 0.2, 1.);
+      settings.weights = randomWeights(random, 3);
       settings.world_aligned = random.coin();
       settings.radius = random.uniform(0., 0.05);
       settings.frame_name = "point";
@@ -282,10 +292,11 @@ BOOST_AUTO_TEST_CASE(forces_sum_to_the_wrench_within_the_cones_at_the_lowest_cos
   int interior = 0, tightened = 0;
   WrenchDistribution distribution;
   for (int trial = 0; trial < 2000; ++trial) {
-    // The sum of forces within the cones can be distributed, of course.
+    // The sum of forces within the cones can be distributed, of course; of forces on their
+    // boundary, too.
     const Contacts contacts = randomContacts(random);
     const Problem problem = stackedProblem(contacts);
-    const double fraction = random.uniform(0., 0.98);
+    const double fraction = random.coin() ? random.uniform(0., 1.) : 1.;
     VectorXd given(problem.q.size());
     Index col = 0;
     for (const auto& contact : contacts) {
@@ -437,9 +448,9 @@ BOOST_AUTO_TEST_CASE(numbers_that_are_not_finite_are_a_numerical_failure) {
   BOOST_TEST(close(distribution.forces()[2], 250., 1e-10));
 }
 
-BOOST_AUTO_TEST_CASE(what_is_called_solved_is_solved_even_where_equalities_depend_on_each_other) {
-  // One point, two points and three in a row cannot give every wrench, and some of those that they
-  // can give are asked for here.
+BOOST_AUTO_TEST_CASE(fewer_than_three_points_give_what_they_can) {
+  // One point, two points and three in a row cannot give every wrench: the equalities depend on
+  // each other. Some wrenches that they can give, and some that they cannot, are asked for here.
   Random random(4);
   WrenchDistribution distribution;
   for (int trial = 0; trial < 300; ++trial) {
@@ -452,13 +463,16 @@ BOOST_AUTO_TEST_CASE(what_is_called_solved_is_solved_even_where_equalities_depen
     for (Index i = 0; i < points; ++i)
       given.segment<3>(3 * i) = randomForce(random, *contacts[i], 0.9);
     Vector6 total = problem.ne * given;
-    if (random.coin()) total += random.vector(6, 50.);
+    const bool withinReach = random.coin();
+    if (!withinReach) total += random.vector(6, 50.);
 
     const auto status = solve(distribution, contacts, total);
-    if (status == DistributionStatus::Solved) {
-      BOOST_TEST(close(problem.ne * distribution.forces(), total, 1e-8));
+    if (withinReach) {
+      BOOST_TEST(status == DistributionStatus::Solved);
+      BOOST_TEST(close(problem.ne * distribution.forces(), total, 1e-9));
       BOOST_TEST((problem.inequalities * distribution.forces()).maxCoeff() <= 1e-6);
     } else {
+      BOOST_TEST(status == DistributionStatus::Infeasible);
       BOOST_TEST(isZero(distribution.forces()));
     }
   }
@@ -491,6 +505,17 @@ BOOST_AUTO_TEST_CASE(contacts_are_taken_as_they_are_when_added) {
   BOOST_TEST(distribution.solve(wrench(0., 0., 500.)) == DistributionStatus::Solved);
   BOOST_TEST(close(distribution.forces()[2], 250., 1e-10));
   BOOST_TEST(close(distribution.forces()[8], 250., 1e-10));
+}
+
+BOOST_AUTO_TEST_CASE(a_contact_without_settings_is_refused) {
+  WrenchDistribution distribution;
+  for (const auto& contact : twoSoles()) distribution.add(*contact);
+  BOOST_TEST(
+      throws<std::invalid_argument>([&] { distribution.add(Contact6D()); }, {"initialised"}));
+  BOOST_TEST(
+      throws<std::invalid_argument>([&] { distribution.add(ContactPoint()); }, {"initialised"}));
+  BOOST_TEST(distribution.solve(wrench(0., 0., 500.)) == DistributionStatus::Solved);
+  BOOST_TEST(close(distribution.forces()[2], 250., 1e-10));
 }
 
 BOOST_AUTO_TEST_CASE(clear_begins_anew) {
