@@ -13,6 +13,7 @@ namespace dynacom::python {
 
 namespace bp = boost::python;
 
+void takeNumpyScalars();
 void exposeCentroidal();
 void exposeContactBase();
 void exposeContactPoint();

@@ -241,20 +241,29 @@ BOOST_AUTO_TEST_CASE(what_dynacom_does_to_contacts_allocates_nothing) {
 }
 
 BOOST_AUTO_TEST_CASE(a_distribution_of_the_same_sizes_allocates_nothing) {
-  Standing standing(false);
-  const ContactBase& left = *standing.dynacom.getContact("sole0");
-  const ContactBase& right = *standing.dynacom.getContact("sole1");
-  const Vector6 wrench = left.ne_A().col(2) * 200. + right.ne_A().col(2) * 300.;
-  WrenchDistribution distribution;
-  auto status = DistributionStatus::NoContact;
-  const auto solve = [&](const ContactBase& first, const ContactBase& second) {
-    distribution.clear();
-    distribution.add(first);
-    distribution.add(second);
-    status = distribution.solve(wrench);
-  };
-  solve(left, right);
-  BOOST_TEST(allocationsIn([&] { solve(right, left); }) == 0);
-  BOOST_TEST(status == DistributionStatus::Solved);
-  BOOST_TEST(distribution.forces().size() == 12);
+  // Wrenches at the limit of friction, so that inequalities become active, and leave again.
+  for (const bool onPoints : {false, true}) {
+    Standing standing(onPoints);
+    std::vector<std::shared_ptr<ContactBase>> contacts;
+    for (const auto& name : standing.dynacom.getActiveContacts())
+      contacts.push_back(standing.dynacom.getContact(name));
+    WrenchDistribution distribution;
+    for (int trial = 0; trial < 200; ++trial) {
+      Vector6 wrench = Vector6::Zero();
+      for (const auto& contact : contacts) {
+        const double fz = standing.random.uniform(10., 300.);
+        VectorXd force = VectorXd::Zero(contact->cols());
+        force.head<3>() << standing.random.vector(2, 0.7 * fz), fz;
+        wrench += contact->ne_A() * force;
+      }
+      auto status = DistributionStatus::NoContact;
+      const int allocated = allocationsIn([&] {
+        distribution.clear();
+        for (const auto& contact : contacts) distribution.add(*contact);
+        status = distribution.solve(wrench);
+      });
+      BOOST_TEST(status == DistributionStatus::Solved);
+      if (trial > 0) BOOST_TEST(allocated == 0);
+    }
+  }
 }

@@ -713,3 +713,21 @@ def test_the_package_names_its_errors():
     assert issubclass(NotReadyError, RuntimeError)
     assert issubclass(DynacomError, Exception)
     assert dynacom.NotReadyError is NotReadyError
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, np.uint8])
+def test_numbers_of_numpy(kind):
+    """What is read from an array is taken as Python's own numbers are."""
+    settings = dynacom.ContactPointSettings()
+    settings.frame_name = "foot"
+    settings.mu = kind(2)
+    assert settings.mu == 2.0
+    contact = dynacom.ContactPoint(settings)
+    contact.setMu(kind(1))
+    assert contact.getSettings().mu == 1.0
+    contact.setFrameID(np.int64(3))
+    assert contact.getFrameID() == 3
+    settings.world_aligned = np.ones(1, dtype=bool)[0]
+    assert settings.world_aligned is True
+    with pytest.raises(TypeError):
+        settings.mu = np.ones(1)
