@@ -118,9 +118,9 @@ ANYMAL = Robot(
     reference="standing",
     contacts={foot: foot for foot in ANYMAL_FEET},
     feet=ANYMAL_FEET,
-    # The feet are spheres of radius 0.03 m in the URDF. Their centres lie 0.0225 m up the shanks from
-    # these frames, about which crocoddyl's contact forces have no moment: at this height of the
-    # frames the spheres touch the ground, within 2 mm, as the shanks incline.
+    # The feet are spheres of radius 0.03 m in the URDF. Their centres lie 0.0225 m up the shanks
+    # from these frames, about which crocoddyl's contact forces have no moment: at this height of
+    # the frames the spheres touch the ground, within 2 mm, as the shanks incline.
     frame_height=0.0086,
     sole=None,
 )

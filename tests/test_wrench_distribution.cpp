@@ -108,7 +108,8 @@ VectorXd randomForce(Random& random, const ContactBase& contact, double fraction
 }
 
 struct Problem {
-  MatrixXd ne, inequalities;  ///< NE λ = w, [U; C] λ ≤ 0
+  MatrixXd ne, inequalities;  ///< NE λ = w, [U; C] λ ≤ [u; c]
+  VectorXd limits;            ///< [u; c], which is zero for contacts of the library
   VectorXd q;                 ///< the diagonal of Q, weights squared
 };
 
@@ -119,13 +120,16 @@ Problem stackedProblem(const Contacts& contacts) {
     cols += contact->cols();
     rows += contact->uni_rows() + contact->fri_rows();
   }
-  Problem problem{MatrixXd::Zero(6, cols), MatrixXd::Zero(rows, cols), VectorXd::Zero(cols)};
+  Problem problem{MatrixXd::Zero(6, cols), MatrixXd::Zero(rows, cols), VectorXd::Zero(rows),
+                  VectorXd::Zero(cols)};
   Index col = 0, row = 0;
   for (const auto& contact : contacts) {
     problem.ne.middleCols(col, contact->cols()) = contact->ne_A();
     problem.q.segment(col, contact->cols()) = contact->reg_A().cwiseAbs2();
-    for (const MatrixXd& block : {contact->uni_A(), contact->fri_A()}) {
+    for (const auto& [block, limit] : {std::make_pair(contact->uni_A(), contact->uni_b()),
+                                       std::make_pair(contact->fri_A(), contact->fri_b())}) {
       problem.inequalities.block(row, col, block.rows(), block.cols()) = block;
+      problem.limits.segment(row, block.rows()) = limit;
       row += block.rows();
     }
     col += contact->cols();
@@ -169,7 +173,7 @@ double nonNegativeLeastSquares(const MatrixXd& A, const VectorXd& b) {
 /// By how much forces miss the conditions of Karush, Kuhn and Tucker, relative to the cost's
 /// gradient: Q λ + NEᵀ ν + Aᵀ μ = 0 with μ ≥ 0 on the inequalities that are tight, and 0 elsewhere.
 double optimalityGap(const Problem& problem, const VectorXd& forces, Index* tight = nullptr) {
-  const VectorXd slack = -problem.inequalities * forces;
+  const VectorXd slack = problem.limits - problem.inequalities * forces;
   std::vector<Index> rows;
   for (Index i = 0; i < slack.size(); ++i)
     if (slack[i] < 1e-8 * forces.cwiseAbs().maxCoeff()) rows.push_back(i);
@@ -221,6 +225,25 @@ class Magnet : public ContactBase {
 
  private:
   std::string name_ = "magnet";
+};
+
+/// Another: a hand that can give what is within a random polytope, in which a force lies.
+class Hand : public ContactBase {
+ public:
+  Hand(Random& random, const VectorXd& inside) {
+    reset(8, 8, 6);
+    uni_A_ = random.vector(48).reshaped(8, 6);
+    fri_A_ = random.vector(48).reshaped(8, 6);
+    uni_b_ = uni_A_ * inside + random.vector(8, 0., 50.);
+    fri_b_ = fri_A_ * inside + random.vector(8, 0., 50.);
+    reg_A_ = randomWeights(random, 6);
+    updateNewtonEuler(random.vector3(), random.placement());
+  }
+  std::shared_ptr<ContactBase> clone() const override { return std::make_shared<Hand>(*this); }
+  const std::string& getFrameName() const override { return name_; }
+
+ private:
+  std::string name_ = "hand";
 };
 
 Vector6 wrench(double fx, double fy, double fz, double tx = 0., double ty = 0., double tz = 0.) {
@@ -410,6 +433,26 @@ BOOST_AUTO_TEST_CASE(any_contact_is_taken_with_its_own_inequalities) {
   }
   BOOST_TEST(solve(distribution, magnets, wrench(0., 0., -80.)) == DistributionStatus::Solved);
   BOOST_TEST(close(distribution.forces()[2], -40., 1e-10));
+}
+
+BOOST_AUTO_TEST_CASE(forces_are_the_cheapest_within_any_polytopes) {
+  Random random(6);
+  WrenchDistribution distribution;
+  for (int trial = 0; trial < 500; ++trial) {
+    Contacts contacts;
+    const Index hands = random.integer(2, 4);
+    const VectorXd given = random.vector(6 * hands, 100.);
+    for (Index i = 0; i < hands; ++i)
+      contacts.push_back(std::make_shared<Hand>(random, given.segment<6>(6 * i)));
+    const Problem problem = stackedProblem(contacts);
+    const Vector6 total = problem.ne * given;
+    BOOST_REQUIRE(solve(distribution, contacts, total) == DistributionStatus::Solved);
+    const VectorXd& forces = distribution.forces();
+    BOOST_REQUIRE(close(problem.ne * forces, total, 1e-9));
+    BOOST_REQUIRE((problem.inequalities * forces - problem.limits).maxCoeff() <=
+                  1e-9 * forces.cwiseAbs().maxCoeff());
+    BOOST_REQUIRE(optimalityGap(problem, forces) < 1e-7);
+  }
 }
 
 BOOST_AUTO_TEST_CASE(no_force_is_asked_and_none_is_given) {

@@ -5,10 +5,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import dynacom
 import numpy as np
 import pinocchio as pin
 import pytest
+
+import dynacom
 from dynacom.robots import Robot
 
 ROOT = Path(__file__).parents[2]

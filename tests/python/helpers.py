@@ -6,11 +6,12 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import dynacom
 import numpy as np
 import pinocchio as pin
-from dynacom import Contact6D, Contact6DSettings, ContactPoint, ContactPointSettings, DynaCoM
 from hypothesis import settings
+
+import dynacom
+from dynacom import Contact6D, Contact6DSettings, ContactPoint, ContactPointSettings, DynaCoM
 
 ROOT = Path(__file__).parents[2]
 SHARED_DATA = ROOT.parent / "shared" / "data"

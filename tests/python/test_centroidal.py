@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: BSD-2-Clause
-import dynacom
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose, assert_array_equal
+
+import dynacom
 from dynacom import CentroidalState, CentroidalWrench, DynaCoM
 from helpers import (
     CALM,
@@ -13,10 +18,6 @@ from helpers import (
     random_tree,
     to_com,
 )
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
-from numpy.testing import assert_allclose, assert_array_equal
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 

@@ -9,9 +9,10 @@ import subprocess
 import sys
 import time
 
-import dynacom
 import numpy as np
 import pytest
+
+import dynacom
 from dynacom import cli, report
 
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-2-Clause
-import dynacom
 import eigenpy
 import numpy as np
 import pinocchio as pin
 import pytest
+
+import dynacom
 from dynacom import Contact6D, Contact6DSettings, ContactPoint, ContactPointSettings, DynaCoM
 from dynacom.compat import ALIASES
 

@@ -3,10 +3,14 @@ import copy
 import gc
 import operator
 
-import dynacom
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import dynacom
 from dynacom import (
     Contact6D,
     Contact6DSettings,
@@ -27,9 +31,6 @@ from helpers import (
     sole_settings,
     to_com,
 )
-from hypothesis import given
-from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
 
 MU, GU, DX, DY = 0.3, 0.4, 0.1, 0.05
 

@@ -7,10 +7,14 @@ import threading
 import weakref
 from pathlib import Path
 
-import dynacom
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import dynacom
 from dynacom import (
     Contact6D,
     ContactBase,
@@ -38,9 +42,6 @@ from helpers import (
     robots_folder,
     sole,
 )
-from hypothesis import given
-from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
 
 SOLVED = DistributionStatus.Solved
 G = 9.81

@@ -2,13 +2,14 @@
 import gc
 import threading
 
-import dynacom
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import dynacom
 from dynacom import ContactSchedule, DistributionStatus, DynaCoM, Motion, NotReadyError
 from helpers import array_kinds, point, random_configuration, random_humanoid, sole
-from numpy.testing import assert_allclose, assert_array_equal
 
 SOLVED = DistributionStatus.Solved
 FRAMES = 12

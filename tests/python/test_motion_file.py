@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-2-Clause
 import re
 
-import dynacom
 import numpy as np
 import pytest
-from dynacom import DynacomError, read_motion
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+import dynacom
+from dynacom import DynacomError, read_motion
 
 
 def refuses(path, *parts):

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import yaml
+
 from dynacom import Contact6DSettings, ContactPointSettings, DistributionStatus, DynacomError
 from dynacom.robots import list_robots, load_robot, read_robot_file
 

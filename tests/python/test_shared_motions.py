@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose
+
 from dynacom import DistributionStatus, DynaCoM
 from dynacom.robots import Robot
 from helpers import SHARED_DATA, assert_gives_wrench, assert_within_cones, to_com
-from numpy.testing import assert_allclose
 
 SOLVED = DistributionStatus.Solved
 FEET = {"left_sole": "left_sole_link", "right_sole": "right_sole_link"}

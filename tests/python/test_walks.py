@@ -3,10 +3,12 @@
 
 from dataclasses import dataclass
 
-import dynacom
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import dynacom
 from dynacom import ContactSchedule, DistributionStatus, DynaCoM, Motion
 from dynacom.robots import Robot
 from helpers import (
@@ -18,7 +20,6 @@ from helpers import (
     sole,
     to_com,
 )
-from numpy.testing import assert_allclose, assert_array_equal
 
 SOLVED = DistributionStatus.Solved
 G = 9.81

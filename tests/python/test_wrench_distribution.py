@@ -8,6 +8,10 @@ import sys
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
 from dynacom import ContactBase, ContactPoint, DistributionStatus, WrenchDistribution
 from helpers import (
     CALM,
@@ -20,9 +24,6 @@ from helpers import (
     random_pose,
     sole,
 )
-from hypothesis import given
-from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
 
 SOLVED = DistributionStatus.Solved
 INFEASIBLE = DistributionStatus.Infeasible
