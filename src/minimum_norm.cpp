@@ -31,7 +31,7 @@ MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& 
     if (violated < 0) return Status::Solved;
     if (iterations == 0) {
       J_.setIdentity();
-      for (Eigen::Index k = 0; k < J_.cols(); ++k) applyQ(J_.col(k));
+      applyQ(J_);
     }
 
     double multiplier = 0.;
@@ -82,6 +82,7 @@ void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E
   u_.resize(n);
   Jn_.resize(n);
   r_.resize(n);
+  workspace_.resize(n);
   active_.clear();
   active_.reserve(n);
 
@@ -103,14 +104,18 @@ void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E
   applyQ(x_);
 }
 
-// Multiplies a vector by Q of the equalities' decomposition: Eigen's own way to do so allocates.
-void MinimumNorm::applyQ(Eigen::Ref<Eigen::VectorXd> vector) const {
+// Multiplies by Q of the equalities' decomposition: Eigen's own way to do so allocates.
+template <class Matrix>
+void MinimumNorm::applyQ(Matrix& matrix) {
+  auto products = workspace_.head(matrix.cols()).transpose();
   for (Eigen::Index k = equalities_ - 1; k >= 0; --k) {
-    const Eigen::Index below = vector.size() - k - 1;
+    const Eigen::Index below = matrix.rows() - k - 1;
     const auto reflector = qr_.matrixQR().col(k).tail(below);
-    const double scale = qr_.hCoeffs()[k] * (vector[k] + reflector.dot(vector.tail(below)));
-    vector[k] -= scale;
-    vector.tail(below) -= scale * reflector;
+    products = matrix.row(k);
+    products.noalias() += reflector.transpose() * matrix.bottomRows(below);
+    products *= qr_.hCoeffs()[k];
+    matrix.row(k) -= products;
+    matrix.bottomRows(below) -= reflector.lazyProduct(products);
   }
 }
 

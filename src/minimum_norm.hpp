@@ -37,7 +37,8 @@ class MinimumNorm {
  private:
   void startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E,
                            const Eigen::Ref<const Eigen::VectorXd>& d);
-  void applyQ(Eigen::Ref<Eigen::VectorXd> vector) const;
+  template <class Matrix>
+  void applyQ(Matrix& matrix);
   Eigen::Index findViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
                             const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance);
   void computeDirections(const Eigen::Ref<const Eigen::VectorXd>& normal);
@@ -57,6 +58,7 @@ class MinimumNorm {
   Eigen::VectorXd Jn_;     // Jᵀ times the normal at hand
   Eigen::VectorXd r_;      // minus the change of u for a unit of the new multiplier
   Eigen::VectorXd slack_;  // Gᵀ x − h
+  Eigen::VectorXd workspace_;
 };
 
 }  // namespace dynacom::internal
