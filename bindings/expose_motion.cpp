@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-2-Clause
+#include <boost/python/stl_iterator.hpp>
+
 #include "bindings.hpp"
 #include "dynacom/motion.hpp"
 
@@ -15,10 +17,10 @@ std::shared_ptr<Motion> makeMotion(const Eigen::VectorXd& time, const Eigen::Mat
   return std::make_shared<Motion>(Motion{time, q.transpose(), v.transpose(), a.transpose()});
 }
 
-std::shared_ptr<Schedule> makeSchedule(const bp::list& names, const Schedule::Matrix& active) {
+std::shared_ptr<Schedule> makeSchedule(const bp::object& names, const Schedule::Matrix& active) {
   auto schedule = std::make_shared<Schedule>();
-  for (bp::ssize_t i = 0; i < bp::len(names); ++i)
-    schedule->names.push_back(bp::extract<std::string>(names[i]));
+  schedule->names.assign(bp::stl_input_iterator<std::string>(names),
+                         bp::stl_input_iterator<std::string>());
   schedule->active = active.transpose();
   return schedule;
 }
@@ -83,8 +85,12 @@ MotionAnalysis analyze(const DynaCoM& robot, const Motion& motion, const Schedul
       // The Python error stays set in this thread until Boost.Python raises it again.
       if (failed) throw bp::error_already_set();
     };
+  // Copies: without the lock, others may change what they hold.
+  const DynaCoM own_robot(robot);
+  const Motion own_motion(motion);
+  const Schedule own_schedule(schedule);
   const WithoutLock without_lock;
-  return analyzeMotion(robot, motion, schedule, settings);
+  return analyzeMotion(own_robot, own_motion, own_schedule, settings);
 }
 
 }  // namespace
@@ -110,7 +116,7 @@ void exposeMotion() {
       .def("__init__",
            bp::make_constructor(&makeSchedule, bp::default_call_policies(),
                                 (bp::arg("names"), bp::arg("active"))),
-           "names: list of C names; active: (T, C) of bool.")
+           "names: C names; active: (T, C) of bool.")
       .add_property("names", &getNames, "Names of the C contacts")
       .add_property("active", &Rows<&Schedule::active>::get, "(T, C) of bool")
       .def("validate", &Schedule::validate, (bp::arg("self"), bp::arg("frames")),

@@ -31,6 +31,19 @@ void requireField(bool holds, const char* field, const char* expected, const Val
   if (!holds) throwInvalid(field, " must be ", expected, ", got ", value);
 }
 
+/// Changes one field of settings, unless they would not be valid then.
+template <class Settings, class Value>
+void changeField(Settings& settings, Value Settings::*field, const Value& value) {
+  const Value former = settings.*field;
+  settings.*field = value;
+  try {
+    settings.validate();
+  } catch (...) {
+    settings.*field = former;
+    throw;
+  }
+}
+
 /// Refuses a natural frequency of the linear inverted pendulum.
 inline void requireOmega(double omega) {
   if (!(omega > 0.)) throwInvalid("omega must be > 0 rad/s, got ", omega);

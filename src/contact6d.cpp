@@ -42,51 +42,44 @@ Contact6D::Contact6D(const Contact6DSettings& settings) { initialize(settings); 
 void Contact6D::initialize(const Contact6DSettings& settings) {
   settings.validate();
   reset(5, 6, 6);
-  updateSettings(settings);
+  settings_ = settings;
+  updateMatrices();
 }
 
 std::shared_ptr<ContactBase> Contact6D::clone() const { return std::make_shared<Contact6D>(*this); }
 
-void Contact6D::setMu(double mu) {
-  Contact6DSettings settings = settings_;
-  settings.mu = mu;
-  updateSettings(settings);
-}
+void Contact6D::setMu(double mu) { change(&Contact6DSettings::mu, mu); }
 
-void Contact6D::setGu(double gu) {
-  Contact6DSettings settings = settings_;
-  settings.gu = gu;
-  updateSettings(settings);
-}
+void Contact6D::setGu(double gu) { change(&Contact6DSettings::gu, gu); }
 
 void Contact6D::setForceWeights(const Eigen::Vector3d& force_weights) {
-  Contact6DSettings settings = settings_;
-  settings.weights.head<3>() = force_weights;
-  updateSettings(settings);
+  Vector6 weights = settings_.weights;
+  weights.head<3>() = force_weights;
+  change(&Contact6DSettings::weights, weights);
 }
 
 void Contact6D::setTorqueWeights(const Eigen::Vector3d& torque_weights) {
-  Contact6DSettings settings = settings_;
-  settings.weights.tail<3>() = torque_weights;
-  updateSettings(settings);
+  Vector6 weights = settings_.weights;
+  weights.tail<3>() = torque_weights;
+  change(&Contact6DSettings::weights, weights);
 }
 
 void Contact6D::setSurfaceHalfWidth(double half_width) {
-  Contact6DSettings settings = settings_;
-  settings.half_width = half_width;
-  updateSettings(settings);
+  change(&Contact6DSettings::half_width, half_width);
 }
 
 void Contact6D::setSurfaceHalfLength(double half_length) {
-  Contact6DSettings settings = settings_;
-  settings.half_length = half_length;
-  updateSettings(settings);
+  change(&Contact6DSettings::half_length, half_length);
 }
 
-void Contact6D::updateSettings(const Contact6DSettings& settings) {
+template <class Value>
+void Contact6D::change(Value Contact6DSettings::*field, const Value& value) {
   if (cols() == 0) throw NotReadyError("Contact6D is used before initialize()");
-  settings.validate();
-  settings_ = settings;
+  internal::changeField(settings_, field, value);
+  updateMatrices();
+}
+
+void Contact6D::updateMatrices() {
   const double dx = settings_.half_length;
   const double dy = settings_.half_width;
   uni_A_ << 0., 0., -1., 0., 0., 0.,  //

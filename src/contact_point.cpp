@@ -38,7 +38,8 @@ ContactPoint::ContactPoint(const ContactPointSettings& settings) { initialize(se
 void ContactPoint::initialize(const ContactPointSettings& settings) {
   settings.validate();
   reset(1, 4, 3);
-  updateSettings(settings);
+  settings_ = settings;
+  updateMatrices();
 }
 
 std::shared_ptr<ContactBase> ContactPoint::clone() const {
@@ -52,22 +53,20 @@ ContactBase::SE3 ContactPoint::getSurfacePose() const {
   return surface;
 }
 
-void ContactPoint::setMu(double mu) {
-  ContactPointSettings settings = settings_;
-  settings.mu = mu;
-  updateSettings(settings);
-}
+void ContactPoint::setMu(double mu) { change(&ContactPointSettings::mu, mu); }
 
 void ContactPoint::setForceWeights(const Eigen::Vector3d& force_weights) {
-  ContactPointSettings settings = settings_;
-  settings.weights = force_weights;
-  updateSettings(settings);
+  change(&ContactPointSettings::weights, force_weights);
 }
 
-void ContactPoint::updateSettings(const ContactPointSettings& settings) {
+template <class Value>
+void ContactPoint::change(Value ContactPointSettings::*field, const Value& value) {
   if (cols() == 0) throw NotReadyError("ContactPoint is used before initialize()");
-  settings.validate();
-  settings_ = settings;
+  internal::changeField(settings_, field, value);
+  updateMatrices();
+}
+
+void ContactPoint::updateMatrices() {
   const double mu = settings_.mu;
   uni_A_ << 0., 0., -1.;
   fri_A_ << 1., 0., -mu,  //

@@ -20,6 +20,18 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+// The index of a contact's frame. Frames of different types may share a name: that says too little.
+pinocchio::FrameIndex findFrame(const pinocchio::Model& model, const std::string& frame_name,
+                                const std::string& contact_name) {
+  const auto has_name = [&](const pinocchio::Frame& frame) { return frame.name == frame_name; };
+  const auto count = std::count_if(model.frames.begin(), model.frames.end(), has_name);
+  if (count != 1)
+    throwInvalid("contact '", contact_name, "': the model must have one frame '", frame_name,
+                 "', got ", count);
+  const auto frame = std::find_if(model.frames.begin(), model.frames.end(), has_name);
+  return static_cast<pinocchio::FrameIndex>(frame - model.frames.begin());
+}
+
 }  // namespace
 
 void DynaCoMSettings::validate() const {
@@ -102,7 +114,7 @@ void DynaCoM::setGroundHeight(double groundHeight) {
 void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
                               const Vector6& extWrench, bool flatHorizontalGround) {
   requireInitialized();
-  requireFrames();
+  updateFrames();
   state_ = computeCentroidalState(model_, data_, q, v, a);
   ground_wrench_ = computeGroundWrench(state_, settings_.gravity, extWrench);
   for (const Entry& entry : contacts_) place(*entry.contact, state_.com);
@@ -140,10 +152,9 @@ void DynaCoM::addContact(const std::shared_ptr<ContactBase>& contact, const std:
       throwInvalid("contact '", name, "' is known already, as '", entry.name, "'");
   }
   // Whatever index the contact holds may be another model's.
-  if (!model_.existFrame(contact->getFrameName()))
-    throwInvalid("contact '", name, "': the model has no frame '", contact->getFrameName(), "'");
+  const pinocchio::FrameIndex frame_id = findFrame(model_, contact->getFrameName(), name);
   contacts_.emplace_back(name, contact, false);
-  contact->setFrameID(model_.getFrameId(contact->getFrameName()));
+  contact->setFrameID(frame_id);
   contact->deactivate();
   if (hasMotion()) place(*contact, state_.com);
   if (active) activateContact(name);
@@ -158,6 +169,7 @@ void DynaCoM::removeContact(const std::string& name) {
 void DynaCoM::activateContact(const std::string& name) {
   const auto entry = find(name);
   if (entry->active) return;
+  updateFrames();
   if (hasMotion()) place(*entry->contact, state_.com);
   const auto end_of_active = firstInactive();
   entry->active = true;
@@ -193,23 +205,17 @@ std::vector<DynaCoM::Entry>::iterator DynaCoM::firstInactive() {
                       [](const Entry& entry) { return !entry.active; });
 }
 
-// The contact's frame in the model. Contacts that were initialised again have forgotten theirs.
-pinocchio::FrameIndex DynaCoM::findFrame(const ContactBase& contact) const {
-  if (contact.getFrameID() < model_.frames.size()) return contact.getFrameID();
-  if (!model_.existFrame(contact.getFrameName()))
-    throwInvalid("the model has no frame '", contact.getFrameName(), "' for a contact");
-  return model_.getFrameId(contact.getFrameName());
-}
-
-// Refuses contacts that cannot be placed, before anything changes.
-void DynaCoM::requireFrames() const {
-  for (const Entry& entry : contacts_) findFrame(*entry.contact);
+// Looks up the frames of contacts that were initialised again, which have forgotten theirs. Refuses
+// those that cannot be placed, before anything else changes.
+void DynaCoM::updateFrames() {
+  for (const Entry& entry : contacts_)
+    if (entry.contact->getFrameID() >= model_.frames.size())
+      entry.contact->setFrameID(findFrame(model_, entry.contact->getFrameName(), entry.name));
 }
 
 // Places a contact where its frame is. By oMi, which every kinematic algorithm of Pinocchio leaves
 // in data.
 void DynaCoM::place(ContactBase& contact, const Eigen::Vector3d& com) {
-  contact.setFrameID(findFrame(contact));
   // Frames may have been added to the model behind a reference to it, which data does not know.
   if (data_.oMf.size() < model_.frames.size())
     data_.oMf.resize(model_.frames.size(), pinocchio::SE3::Identity());
@@ -238,7 +244,7 @@ DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForc
                                             const Eigen::Vector3d& groundCoMTorque,
                                             const Eigen::Vector3d& com) {
   requireInitialized();
-  requireFrames();
+  updateFrames();
   distribution_.clear();
   for (const Entry& entry : contacts_) {
     if (!entry.active) break;

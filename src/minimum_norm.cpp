@@ -11,7 +11,10 @@ namespace {
 
 // A normal whose part outside the span of others is shorter than this, relative to its length,
 // depends on them.
-constexpr double kDependent = 1e-11;
+constexpr double kDependent = 1e-12;
+// An inequality that depends on active ones contradicts them if it is violated by more than this
+// part of what rounding in them can make of it.
+constexpr double kContradiction = 1e-9;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Far above what has been seen, 120 for 88 inequalities.
@@ -26,24 +29,32 @@ MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& 
                                        double tolerance) {
   startWithEqualities(E, d);
   int iterations = 0;
-  for (;;) {
+  for (bool refined = true;;) {
     const Eigen::Index violated = findViolated(G, h, tolerance);
-    if (violated < 0) return Status::Solved;
+    if (violated < 0) {
+      if (refined) return Status::Solved;
+      // Steps pile up rounding; what follows from the active constraints does not.
+      computeSolution();
+      refined = true;
+      continue;
+    }
+    refined = false;
     if (iterations == 0) {
       J_.setIdentity();
       applyQ(J_);
     }
 
     double multiplier = 0.;
-    for (bool added = false; !added;) {
+    for (bool done = false; !done;) {
       if (++iterations > iterationLimit(G.cols())) return Status::IterationLimit;
       computeDirections(G.col(violated));
       // The whole step reaches the inequality; on the way, the multiplier of an active one may
       // reach zero.
       const auto outside = Jn_.tail(Jn_.size() - q_);
+      const double violation = G.col(violated).dot(x_) - h[violated];
       double whole = kInfinity;
       if (outside.squaredNorm() > kDependent * kDependent * Jn_.squaredNorm())
-        whole = (G.col(violated).dot(x_) - h[violated]) / outside.squaredNorm();
+        whole = violation / outside.squaredNorm();
       double partial = kInfinity;
       Eigen::Index leaving = -1;
       for (Eigen::Index k = equalities_; k < q_; ++k) {
@@ -53,21 +64,24 @@ MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& 
         }
       }
       const double step = std::min(whole, partial);
-      // The inequality contradicts the active ones, and none of them can leave.
-      if (step == kInfinity) return Status::Infeasible;
+      if (step == kInfinity) {
+        // The inequality follows from the active ones, and none of them can leave: either it
+        // contradicts them, or all that it lacks is rounding.
+        if (violation > kContradiction * (1. + r_.head(q_).lpNorm<1>())) return Status::Infeasible;
+        implied_.push_back(violated);
+        break;
+      }
 
       if (whole < kInfinity) x_.noalias() -= step * (J_.rightCols(J_.cols() - q_) * outside);
       u_.head(q_) -= step * r_.head(q_);
       multiplier += step;
       if (whole <= partial) {
         activate(violated, h[violated], multiplier);
-        added = true;
+        done = true;
       } else {
         leave(leaving);
       }
     }
-    // Steps pile up rounding; what follows from the active constraints does not.
-    computeSolution();
   }
 }
 
@@ -85,6 +99,7 @@ void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E
   workspace_.resize(n);
   active_.clear();
   active_.reserve(n);
+  implied_.clear();
 
   q_ = equalities_ = 0;
   if (E.cols() > 0) {  // Eigen's decomposition wants one
@@ -126,6 +141,7 @@ Eigen::Index MinimumNorm::findViolated(const Eigen::Ref<const Eigen::MatrixXd>& 
   slack_ = -h;
   slack_.noalias() += G.transpose() * x_;
   for (const Eigen::Index inequality : active_) slack_[inequality] = -kInfinity;
+  for (const Eigen::Index inequality : implied_) slack_[inequality] = -kInfinity;
   Eigen::Index violated = -1;
   if (slack_.size() == 0 || !(slack_.maxCoeff(&violated) > tolerance)) return -1;
   return violated;

@@ -12,8 +12,8 @@ namespace dynacom::internal {
 ///     minimise ½ ‖x‖²   subject to   Eᵀ x = d,   Gᵀ x ≤ h
 ///
 /// by the dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983): from
-/// the least point under the equalities alone, one violated inequality after the other is made
-/// active, and those whose multiplier would become negative on the way are left.
+/// the point of least norm under the equalities alone, one violated inequality after the other is
+/// made active, and those whose multiplier would become negative on the way are left.
 ///
 /// Equalities may depend on each other: those that follow from others are left out, and whether
 /// they hold is for the caller to see. Nothing is allocated once a problem of the same sizes was
@@ -51,8 +51,9 @@ class MinimumNorm {
   // first: N = J₁ R.
   Eigen::MatrixXd J_, R_;
   Eigen::Index q_ = 0, equalities_ = 0;
-  std::vector<Eigen::Index> active_;  // inequalities, in the order of R
-  Eigen::VectorXd rhs_;               // of the active constraints, in the order of R
+  std::vector<Eigen::Index> active_;   // inequalities, in the order of R
+  std::vector<Eigen::Index> implied_;  // inequalities that follow from active ones, up to rounding
+  Eigen::VectorXd rhs_;                // of the active constraints, in the order of R
   Eigen::VectorXd x_;
   Eigen::VectorXd u_;      // multipliers: x + N u = 0
   Eigen::VectorXd Jn_;     // Jᵀ times the normal at hand

@@ -125,13 +125,17 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
   result.omega = settings.omega;
   if (result.omega == 0.)
     result.omega =
-        computeOmega(result.com, -robot.getSettings().gravity.z(), robot.getGroundHeight());
+        computeOmega(result.com, -worker.getSettings().gravity.z(), worker.getGroundHeight());
   if (!std::isnan(result.omega)) {
-    // (7, 8)
-    result.vrp = result.com.topRows<2>() - result.acom.topRows<2>() / std::pow(result.omega, 2);
-    result.nl = result.cop - result.vrp;
+    CentroidalState state;
+    for (Eigen::Index frame = 0; frame < frames; ++frame) {
+      state.com = result.com.col(frame);
+      state.acom = result.acom.col(frame);
+      result.vrp.col(frame) = computeVRP(state, result.omega);
+    }
+    result.nl = result.cop - result.vrp;  // (8)
   }
-  if (settings.progress) settings.progress(frames);
+  if (settings.progress && frames % kProgressFrames != 0) settings.progress(frames);
   return result;
 }
 

@@ -17,24 +17,32 @@ namespace {
 
 // Takes what the URDF parser would print, for as long as it lives. The parser's output is one for
 // the whole process, so only one thread can have it at a time.
-class ParserErrors : public console_bridge::OutputHandler {
+class ParserErrors {
  public:
-  ParserErrors() : lock_(mutex_) { console_bridge::useOutputHandler(this); }
-  ~ParserErrors() override { console_bridge::restorePreviousOutputHandler(); }
+  ParserErrors() : lock_(mutex_) {
+    handler_.text.clear();
+    console_bridge::useOutputHandler(&handler_);
+  }
+  ~ParserErrors() { console_bridge::restorePreviousOutputHandler(); }
   ParserErrors(const ParserErrors&) = delete;
   ParserErrors& operator=(const ParserErrors&) = delete;
 
-  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
-    if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR) return;
-    text_ += (text_.empty() ? "" : "; ") + text;
-  }
-
-  const std::string& text() const { return text_; }
+  const std::string& text() const { return handler_.text; }
 
  private:
+  struct Handler : console_bridge::OutputHandler {
+    void log(const std::string& message, console_bridge::LogLevel level, const char*,
+             int) override {
+      if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR) return;
+      text += (text.empty() ? "" : "; ") + message;
+    }
+    std::string text;
+  };
+
+  // Of the process too: the parser keeps a pointer to it after it was replaced.
+  static inline Handler handler_;
   static inline std::mutex mutex_;
   std::lock_guard<std::mutex> lock_;
-  std::string text_;
 };
 
 // The file's content. Reading it here, not in the parser, tells a missing file from a bad one.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "dynacom/wrench_distribution.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <ostream>
 #include <utility>
 #include <vector>
@@ -16,8 +18,8 @@ using internal::MinimumNorm;
 
 // All for a wrench of unit size: by how much the solver may leave an inequality behind, and how far
 // an answer may be from its inequalities and from the wrench.
-constexpr double kTolerance = 1e-12;
-constexpr double kAccurateInequality = 1e-10;
+constexpr double kTolerance = 1e-11;
+constexpr double kAccurateInequality = 1e-9;
 constexpr double kAccurateWrench = 1e-9;
 
 }  // namespace
@@ -138,6 +140,7 @@ DistributionStatus WrenchDistribution::solve(const Eigen::Matrix<double, 6, 1>& 
 
   if (!wrench.allFinite()) return DistributionStatus::NumericalFailure;
   const double scale = wrench.stableNorm();
+  if (!std::isfinite(scale)) return DistributionStatus::NumericalFailure;
   if (scale == 0.) return DistributionStatus::Solved;
   work.assemble(wrench, scale);
   if (!work.E.allFinite()) return DistributionStatus::NumericalFailure;
@@ -160,6 +163,10 @@ DistributionStatus WrenchDistribution::solve(const Eigen::Matrix<double, 6, 1>& 
     if (!(work.G.col(j).dot(x) - work.h[j] <= kAccurateInequality))
       return DistributionStatus::NumericalFailure;
   work.forces = scale * work.inverse_weights.cwiseProduct(x);
+  if (!work.forces.allFinite()) {  // beyond the largest numbers
+    work.forces.setZero();
+    return DistributionStatus::NumericalFailure;
+  }
   return DistributionStatus::Solved;
 }
 

@@ -455,6 +455,52 @@ BOOST_AUTO_TEST_CASE(forces_are_the_cheapest_within_any_polytopes) {
   }
 }
 
+/// A force just inside a corner of a contact's cone.
+VectorXd cornerForce(Random& random, const ContactBase& contact) {
+  VectorXd force = randomForce(random, contact, 1.);
+  const auto sign = [&random] { return (1. - 1e-6) * (random.coin() ? 1. : -1.); };
+  const double fz = force[2];
+  const auto& settings = dynamic_cast<const Contact6D&>(contact).getSettings();
+  force << sign() * settings.mu * fz, sign() * settings.mu * fz, fz,
+      sign() * settings.half_width * fz, sign() * settings.half_length * fz,
+      sign() * settings.gu * fz;
+  return force;
+}
+
+// Two feet on the same ground, or nearly, which lean on their edges and all but slide: what they can
+// give has hardly an interior there, and many inequalities nearly follow from others.
+BOOST_AUTO_TEST_CASE(corners_of_the_cones_of_nearly_parallel_soles_are_reached) {
+  Random random(19);
+  for (int i = 0; i < 20000; ++i) {
+    Contacts contacts;
+    Vector6 total = Vector6::Zero();
+    for (const double side : {-0.1, 0.1}) {
+      const double tilt = random.coin() ? 0. : std::pow(10., random.uniform(-13., -3.));
+      Contact6DSettings settings;
+      settings.mu = 0.7;
+      settings.gu = 0.08;
+      settings.half_length = 0.10;
+      settings.half_width = 0.06;
+      settings.weights << 1., 1., random.coin() ? 1. : 1e-3, 10., 10., 10.;
+      settings.frame_name = "sole";
+      contacts.push_back(std::make_shared<Contact6D>(settings));
+      contacts.back()->updateNewtonEuler(Vector3d(0., 0., 0.9),
+                                         SE3(randomTilt(random, tilt), Vector3d(0.1, side, 0.)));
+      const VectorXd force = random.coin() ? cornerForce(random, *contacts.back())
+                                           : randomForce(random, *contacts.back(), 1.);
+      total += contacts.back()->ne_A() * force;
+    }
+    BOOST_TEST_CONTEXT("problem " << i) {
+      WrenchDistribution distribution;
+      BOOST_TEST(solve(distribution, contacts, total) == DistributionStatus::Solved);
+      const Problem problem = stackedProblem(contacts);
+      const VectorXd& forces = distribution.forces();
+      BOOST_TEST((problem.ne * forces - total).norm() <= 1e-8 * total.norm());
+      BOOST_TEST((problem.inequalities * forces).maxCoeff() <= 1e-8 * total.norm());
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(no_force_is_asked_and_none_is_given) {
   WrenchDistribution distribution;
   BOOST_TEST(solve(distribution, twoSoles(), Vector6::Zero()) == DistributionStatus::Solved);

@@ -41,6 +41,7 @@ DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const Contact6DSettin
 ///         [0 0 −dy −1  0 0]          [ 0  0 −γ 0 0  1]
 ///                                    [ 0  0 −γ 0 0 −1]
 ///
+/// The pyramid circumscribes the friction cone: on its diagonals it allows √2 μ f_z.
 /// dx is half_length, dy half_width, γ is gu; R and p are the orientation and the position of the
 /// contact's frame, c is the CoM.
 class DYNACOM_EXPORT Contact6D : public ContactBase {
@@ -69,7 +70,9 @@ class DYNACOM_EXPORT Contact6D : public ContactBase {
   void setSurfaceHalfLength(double half_length);
 
  private:
-  void updateSettings(const Contact6DSettings& settings);
+  template <class Value>
+  void change(Value Contact6DSettings::*field, const Value& value);
+  void updateMatrices();
 
   Contact6DSettings settings_;
 };

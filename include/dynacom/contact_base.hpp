@@ -53,6 +53,7 @@ class DYNACOM_EXPORT ContactBase {
   /// Placement of the contact's frame in the world, as last given to setPose() or
   /// updateNewtonEuler(); the identity before.
   const SE3& getPose() const { return pose_; }
+  /// Places the contact's frame, and leaves ne_A() as it is.
   void setPose(const SE3& pose) { pose_ = pose; }
 
   /// Placement oMs of the surface in the world: getPose(), unless the settings say otherwise
@@ -83,7 +84,8 @@ class DYNACOM_EXPORT ContactBase {
 
   /// Sets the pose and brings ne_A() up to date.
   /// @param com  position of the centre of mass, world [m]
-  /// @param oMs  placement of the contact's frame in the world
+  /// @param oMs  placement of the contact's frame in the world; where the surface is, is up to
+  ///             getSurfacePose()
   void updateNewtonEuler(const Eigen::Vector3d& com, const SE3& oMs);
 
   /// The force λ in force, cols() components; zero before applyForce().

@@ -37,6 +37,7 @@ DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const ContactPointSet
 ///                           [−1  0 −μ]
 ///                           [ 0 −1 −μ]
 ///
+/// The pyramid circumscribes the friction cone: on its diagonals it allows √2 μ f_z.
 /// R and p are the orientation and the position of the surface's frame, c is the CoM.
 class DYNACOM_EXPORT ContactPoint : public ContactBase {
  public:
@@ -61,7 +62,9 @@ class DYNACOM_EXPORT ContactPoint : public ContactBase {
   void setForceWeights(const Eigen::Vector3d& force_weights);
 
  private:
-  void updateSettings(const ContactPointSettings& settings);
+  template <class Value>
+  void change(Value ContactPointSettings::*field, const Value& value);
+  void updateMatrices();
 
   ContactPointSettings settings_;
 };

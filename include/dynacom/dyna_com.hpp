@@ -40,9 +40,10 @@ DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const DynaCoMSettings
 /// Everything is in the world's axes unless another frame is named. Before computeDynamics() all
 /// numbers of the motion are NaN.
 ///
-/// Once the contacts are set, computeDynamics(), computeNL(), distributeForce() and the getters
-/// that return references neither allocate nor print, and throw only for mistakes in the program:
-/// a vector of the wrong size, a contact whose frame does not exist.
+/// Once the contacts are set and each was called once, computeDynamics(), computeNL(),
+/// distributeForce() and the getters that return references neither allocate nor print, and throw
+/// only for mistakes in the program: a vector of the wrong size, a contact whose frame does not
+/// exist. The first distribution after a contact was activated or deactivated may allocate.
 class DYNACOM_EXPORT DynaCoM {
  public:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -56,8 +57,8 @@ class DYNACOM_EXPORT DynaCoM {
   /// @throws std::invalid_argument as initialize(model)
   explicit DynaCoM(const pinocchio::Model& model);
 
-  /// Reads the robot and forgets the contacts; may be called again. Nothing has changed when it
-  /// throws.
+  /// Reads the robot and forgets the contacts, not the ground's height; may be called again.
+  /// Nothing has changed when it throws.
   /// @throws std::invalid_argument if the settings are not valid, the URDF cannot be read, or the
   ///         robot has no mass
   void initialize(const DynaCoMSettings& settings);
@@ -92,6 +93,7 @@ class DYNACOM_EXPORT DynaCoM {
   /// with p_k the centre of pressure of contact k and f_k its force. Contacts without load drop
   /// out.
   /// @param extWrench  (force [N], moment [N·m]) on the robot besides the contacts', about the CoM
+  /// Numbers that are not finite make the results that depend on them NaN or infinite.
   /// @throws std::invalid_argument if a vector has the wrong size; NotReadyError before
   ///         initialize()
   void computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
@@ -123,13 +125,13 @@ class DYNACOM_EXPORT DynaCoM {
                  const Vector6& extWrench = Vector6::Zero(), bool flatHorizontalGround = true);
 
   const Eigen::Vector2d& getVRP() const { return vrp_; }  ///< Of the last computeNL() [m].
-  const Eigen::Vector2d& getNL() const { return nl_; }    ///< Of the last computeNL() [m].
+  const Eigen::Vector2d& getNL() const { return nl_; }    ///< The same; NaN where the CoP is.
 
   /// Makes a contact known under a name, and active unless said otherwise. It is shared, not
   /// copied: settings that change in the caller's hand act on the next call. A contact serves one
   /// DynaCoM at a time, which sets its frame index, its pose and its force.
   /// @throws std::invalid_argument if the contact is null, was never initialised or is known
-  ///         already, the name is taken, or the model does not have the contact's frame
+  ///         already, the name is taken, or the model does not have one frame of the contact's name
   void addContact(const std::shared_ptr<ContactBase>& contact, const std::string& name,
                   bool active = true);
   /// Forgets a contact; its force becomes zero.
@@ -204,8 +206,7 @@ class DYNACOM_EXPORT DynaCoM {
   std::vector<Entry>::const_iterator find(const std::string& name) const;
   std::vector<Entry>::iterator find(const std::string& name);
   std::vector<Entry>::iterator firstInactive();
-  pinocchio::FrameIndex findFrame(const ContactBase& contact) const;
-  void requireFrames() const;
+  void updateFrames();
   void place(ContactBase& contact, const Eigen::Vector3d& com);
   Eigen::Vector2d computePressureCentre() const;
   template <class Rows, class Block>

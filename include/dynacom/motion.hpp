@@ -70,7 +70,7 @@ struct MotionAnalysis {
   std::vector<DistributionStatus> status;
   /// Ground wrench minus what the contacts give, about c.
   Eigen::Matrix<double, 6, Eigen::Dynamic> residual;
-  std::vector<Contact> contacts;  ///< all that the robot knows, in its order
+  std::vector<Contact> contacts;  ///< all, as getKnownContacts() of the robot
 };
 
 /// Computes dynamics and distribution for every frame of a motion. The robot given is left as it

@@ -6,7 +6,7 @@ import os
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,7 +70,8 @@ def results_folder(path: Path) -> Iterator[Path]:
                 os.replace(file, path / file.name)
     except BaseException:
         if not existed:
-            path.rmdir()
+            with suppress(OSError):
+                path.rmdir()
         raise
 
 

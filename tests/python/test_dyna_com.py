@@ -808,7 +808,7 @@ def test_contact_whose_frame_is_gone(robot):
         lambda: robot.computeNL(4.0, *motion(model, 1)),
         lambda: robot.distributeForce(*wrench, np.zeros(3)),
     ):
-        with pytest.raises(ValueError, match="no frame 'nowhere'"):
+        with pytest.raises(ValueError, match="must have one frame 'nowhere', got 0"):
             call()
         assert_same(state(robot), before)
     settings.frame_name = right
@@ -901,7 +901,7 @@ def test_contacts_that_cannot_be_added(robot, add):
         (robot.getContact("c"), "z", "'z' is known already, as 'c'"),
         (Contact6D(), "z", "'z' was never initialised"),
         (ContactPoint(), "z", "'z' was never initialised"),
-        (sole(frame_name="nowhere"), "z", "'z': the model has no frame 'nowhere'"),
+        (sole(frame_name="nowhere"), "z", "'z': the model must have one frame 'nowhere', got 0"),
         (None, "z", "'z' must not be null"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -1377,3 +1377,17 @@ def test_names_and_parameters_are_those_of_the_headers(root, header, cls):
     home = getattr(dynacom, cls) if cls else dynacom
     for name, overloads in signatures.items():
         assert python_signatures(getattr(home, name)) == overloads, name
+
+
+def test_frame_name_of_two_frames():
+    """Pinocchio allows one name for frames of different types: which is meant cannot be known."""
+    model = pin.buildSampleModelHumanoidRandom()
+    for kind in (pin.FrameType.OP_FRAME, pin.FrameType.SENSOR):
+        model.addFrame(pin.Frame("twice", 1, 0, pin.SE3.Identity(), kind))
+    robot = DynaCoM(model)
+    settings = dynacom.ContactPointSettings()
+    settings.frame_name = "twice"
+    message = "contact 'foot': the model must have one frame 'twice', got 2"
+    with pytest.raises(ValueError, match=message):
+        robot.addContact(dynacom.ContactPoint(settings), "foot")
+    assert robot.getKnownContacts() == []

@@ -1,5 +1,6 @@
 """README is true: every block of code in it runs. The C++ block is a test of ctest's."""
 
+import json
 import os
 import re
 import subprocess
@@ -57,3 +58,20 @@ def test_command(command, tmp_path):
         ["bash", "-ec", absolute], cwd=tmp_path, env=environment, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
+    if "--json bench.json" in command:
+        rows = json.loads((tmp_path / "bench.json").read_text())
+        assert {row["name"].split("/")[0] for row in rows} == {"distributeForce"}
+        for row in rows:
+            assert set(row) == {"name", "reference", "median_ns", "ratio"}
+            assert row["median_ns"] > 0 and row["ratio"] > 0
+            assert all(text in done.stdout for text in (row["name"], row["reference"]))
+    if command == "scripts/demo":
+        assert "demo_output/frames.csv" in done.stdout.splitlines()[-1]
+
+
+def test_links():
+    """Links within the project lead to files of the project."""
+    for document in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
+        for link in re.findall(r"\]\(([^)]+)\)", document.read_text()):
+            if "://" not in link:
+                assert (document.parent / link.split("#")[0]).exists(), f"{document.name}: {link}"
