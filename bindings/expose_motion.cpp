@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-2-Clause
-#include <boost/python/stl_iterator.hpp>
-
 #include "bindings.hpp"
 #include "dynacom/motion.hpp"
 
@@ -19,8 +17,14 @@ std::shared_ptr<Motion> makeMotion(const Eigen::VectorXd& time, const Eigen::Mat
 
 std::shared_ptr<Schedule> makeSchedule(const bp::object& names, const Schedule::Matrix& active) {
   auto schedule = std::make_shared<Schedule>();
-  schedule->names.assign(bp::stl_input_iterator<std::string>(names),
-                         bp::stl_input_iterator<std::string>());
+  if (PyUnicode_Check(names.ptr())) {  // whose letters would be the names
+    PyErr_SetString(PyExc_TypeError, "names must be several names, got one text");
+    bp::throw_error_already_set();
+  }
+  // list() takes any iterable, and refuses what is none.
+  const bp::list list(names);
+  for (bp::ssize_t i = 0; i < bp::len(list); ++i)
+    schedule->names.push_back(bp::extract<std::string>(list[i]));
   schedule->active = active.transpose();
   return schedule;
 }

@@ -151,6 +151,7 @@ void DynaCoM::addContact(const std::shared_ptr<ContactBase>& contact, const std:
     if (entry.contact == contact)
       throwInvalid("contact '", name, "' is known already, as '", entry.name, "'");
   }
+  updateFrames();
   // Whatever index the contact holds may be another model's.
   const pinocchio::FrameIndex frame_id = findFrame(model_, contact->getFrameName(), name);
   contacts_.emplace_back(name, contact, false);

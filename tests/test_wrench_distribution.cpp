@@ -467,8 +467,8 @@ VectorXd cornerForce(Random& random, const ContactBase& contact) {
   return force;
 }
 
-// Two feet on the same ground, or nearly, which lean on their edges and all but slide: what they can
-// give has hardly an interior there, and many inequalities nearly follow from others.
+// Two feet on the same ground, or nearly, which lean on their edges and all but slide: what they
+// can give has hardly an interior there, and many inequalities nearly follow from others.
 BOOST_AUTO_TEST_CASE(corners_of_the_cones_of_nearly_parallel_soles_are_reached) {
   Random random(19);
   for (int i = 0; i < 20000; ++i) {

@@ -534,7 +534,7 @@ def test_wrong_types(robot, model, arrays, motion, active, schedule):
         for wrong in (None, "q", 3.0, np.ones((2, 2, 2)), np.array([["a"]]), [[1.0]]):
             with pytest.raises(TypeError):
                 Motion(**arrays | {name: wrong})
-    for wrong in (None, "left", 3, np.array(NAMES), (1, 2, 3), [1, 2, 3], [None] * 3):
+    for wrong in (None, "left", 3, (1, 2, 3), [1, 2, 3], [None] * 3):
         with pytest.raises(TypeError):
             ContactSchedule(wrong, active)
     for wrong in (None, "left", [[True]], active.astype(float), np.array([["a"]])):
