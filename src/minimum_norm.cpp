@@ -28,6 +28,8 @@ MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& 
                                        const Eigen::Ref<const Eigen::VectorXd>& h,
                                        double tolerance) {
   startWithEqualities(E, d);
+  implied_.clear();
+  implied_.reserve(G.cols());
   int iterations = 0;
   for (bool refined = true;;) {
     const Eigen::Index violated = findViolated(G, h, tolerance);
@@ -99,7 +101,6 @@ void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E
   workspace_.resize(n);
   active_.clear();
   active_.reserve(n);
-  implied_.clear();
 
   q_ = equalities_ = 0;
   if (E.cols() > 0) {  // Eigen's decomposition wants one
@@ -173,6 +174,7 @@ void MinimumNorm::activate(Eigen::Index inequality, double rhs, double multiplie
 // Takes the constraint at a position of R, an inequality, out of the active ones.
 void MinimumNorm::leave(Eigen::Index position) {
   active_.erase(active_.begin() + (position - equalities_));
+  implied_.clear();  // perhaps by this one
   --q_;
   for (Eigen::Index k = position; k < q_; ++k) {
     R_.col(k).head(k + 2) = R_.col(k + 1).head(k + 2);
