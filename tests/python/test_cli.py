@@ -493,6 +493,8 @@ def test_ctrl_c_while_writing(tmp_path, talos_motion, motion_file):
         [sys.executable, "-m", "dynacom", "analyze", path, "--robot", "talos", "--out", out],
         stderr=subprocess.PIPE,
         text=True,
+        # Where the tests run in the background of a shell, they and their children ignore it.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 60
     while not out.exists() and time.monotonic() < deadline:
