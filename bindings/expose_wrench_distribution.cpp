@@ -4,6 +4,15 @@
 
 namespace dynacom::python {
 
+namespace {
+
+DistributionStatus solve(WrenchDistribution& self, const Eigen::VectorXd& wrench,
+                         double minimal_scale) {
+  return self.solve(toVector<6>("wrench", wrench), minimal_scale);
+}
+
+}  // namespace
+
 void exposeWrenchDistribution() {
   bp::enum_<DistributionStatus>("DistributionStatus",
                                 "How a distribution ended.\n\n"
@@ -28,9 +37,10 @@ void exposeWrenchDistribution() {
            "Begins a new problem, without contacts.")
       .def("add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact")),
            "Adds a contact with the matrices that it has now.")
-      .def("solve", method(&WrenchDistribution::solve, "wrench"),
+      .def("solve", &solve, (bp::arg("self"), bp::arg("wrench"), bp::arg("minimalScale") = 0.),
            "Solves for the forces that give a wrench, (6,): force [N], moment [N·m] about the\n"
-           "centre of mass, world axes. Returns the DistributionStatus.")
+           "centre of mass, world axes. Tolerances are relative to its norm, but at least to\n"
+           "minimalScale [N]. Returns the DistributionStatus.")
       .def("forces", &WrenchDistribution::forces, bp::arg("self"), Copied(),
            "The forces of all contacts, in the order of add(), each in its surface's frame; zero\n"
            "unless solved.")

@@ -19,6 +19,8 @@ using internal::throwInvalid;
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// Turns a mass into the force that distributions are compared with, whatever gravity is [m/s²].
+constexpr double kStandardGravity = 9.81;
 
 // The index of a contact's frame. Frames of different types may share a name: that says too little.
 pinocchio::FrameIndex findFrame(const pinocchio::Model& model, const std::string& frame_name,
@@ -253,7 +255,7 @@ DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForc
     distribution_.add(*entry.contact);
   }
   ne_b_ << groundCoMForce, groundCoMTorque;
-  status_ = distribution_.solve(ne_b_);
+  status_ = distribution_.solve(ne_b_, mass_ * kStandardGravity);
 
   Eigen::Index col = 0;
   for (const Entry& entry : contacts_) {

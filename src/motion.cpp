@@ -14,6 +14,8 @@ using internal::throwInvalid;
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// How far a quaternion's squared norm may be from 1: files are often rounded to a few digits.
+constexpr double kNormalized = 1e-3;
 // How many frames pass between two calls of AnalysisSettings::progress.
 constexpr Eigen::Index kProgressFrames = 256;
 
@@ -45,6 +47,9 @@ void Motion::validate(const pinocchio::Model& model) const {
                    " s in frame ", frame);
   }
   requireFrames("q", q, model.nq, "components (nq)", frames());
+  for (Eigen::Index frame = 0; frame < frames(); ++frame)
+    if (!pinocchio::isNormalized(model, q.col(frame), kNormalized))
+      throwInvalid("q must have quaternions of norm 1, got another in frame ", frame);
   requireFrames("v", v, model.nv, "components (nv)", frames());
   requireFrames("a", a, model.nv, "components (nv)", frames());
 }

@@ -56,7 +56,7 @@ struct WrenchDistribution::Workspace {
   std::size_t count = 0;
   Eigen::VectorXd forces;
 
-  // The problem as the solver wants it. Its variable is x = W λ / ‖w‖, with W the weights over
+  // The problem as the solver wants it. Its variable is x = W λ / scale, with W the weights over
   // their largest: the cost becomes the norm of x, and tolerances mean the same for a mouse and for
   // an elephant.
   Eigen::VectorXd inverse_weights;
@@ -131,7 +131,8 @@ void WrenchDistribution::add(const ContactBase& contact) {
   added.NE = contact.ne_A();
 }
 
-DistributionStatus WrenchDistribution::solve(const Eigen::Matrix<double, 6, 1>& wrench) {
+DistributionStatus WrenchDistribution::solve(const Eigen::Matrix<double, 6, 1>& wrench,
+                                             double minimalScale) {
   Workspace& work = *work_;
   Eigen::Index n = 0;
   for (std::size_t k = 0; k < work.count; ++k) n += work.contacts[k].A.cols();
@@ -139,7 +140,7 @@ DistributionStatus WrenchDistribution::solve(const Eigen::Matrix<double, 6, 1>& 
   if (n == 0) return DistributionStatus::NoContact;
 
   if (!wrench.allFinite()) return DistributionStatus::NumericalFailure;
-  const double scale = wrench.stableNorm();
+  const double scale = std::max(wrench.stableNorm(), minimalScale);
   if (!std::isfinite(scale)) return DistributionStatus::NumericalFailure;
   if (scale == 0.) return DistributionStatus::Solved;
   work.assemble(wrench, scale);

@@ -20,8 +20,8 @@ struct DYNACOM_EXPORT Motion {
   Eigen::Index frames() const { return time.size(); }
 
   /// @throws std::invalid_argument naming the first array (and frame) that has another size than
-  ///         the model or time says, or a number that is not finite, or a time that does not
-  ///         increase
+  ///         the model or time says, or a number that is not finite, a quaternion whose norm is not
+  ///         1, or a time that does not increase
   void validate(const pinocchio::Model& model) const;
 };
 

@@ -49,8 +49,11 @@ class DYNACOM_EXPORT WrenchDistribution {
   void add(const ContactBase& contact);
 
   /// Solves for the forces that give a wrench.
-  /// @param wrench  (force [N], moment [N·m]) about the CoM, world axes
-  DistributionStatus solve(const Eigen::Matrix<double, 6, 1>& wrench);
+  /// @param wrench        (force [N], moment [N·m]) about the CoM, world axes
+  /// @param minimalScale  tolerances are relative to the norm of the wrench, but at least to this,
+  ///                      ≥ 0 [N]: the robot's weight, say, so that a free fall, where the wrench
+  ///                      is all rounding, is one
+  DistributionStatus solve(const Eigen::Matrix<double, 6, 1>& wrench, double minimalScale = 0.);
 
   /// The forces λ of all contacts, in the order of add(), each in its surface's frame; zero unless
   /// solve() returned DistributionStatus::Solved.

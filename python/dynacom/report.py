@@ -180,9 +180,10 @@ def summary_table(summary: Summary) -> Table:
     table.add_row("CoP range, y", f"{y_min:.4f} to {y_max:.4f} m")
     table.add_section()
     for share in summary.shares:
-        table.add_row(
-            escape(f"Weight on {share.name}"),
-            f"{share.overall:.1%} ({share.while_active:.1%} while active, "
-            f"in {share.active:.1%} of the frames)",
-        )
+        text = f"{share.overall:.1%}"
+        if share.active > 0.0:
+            text += f" ({share.while_active:.1%} while active, in {share.active:.1%} of the frames)"
+        else:
+            text += " (never active)"
+        table.add_row(escape(f"Weight on {share.name}"), text)
     return table

@@ -1391,3 +1391,15 @@ def test_frame_name_of_two_frames():
     with pytest.raises(ValueError, match=message):
         robot.addContact(dynacom.ContactPoint(settings), "foot")
     assert robot.getKnownContacts() == []
+
+
+def test_free_fall_asks_nothing_of_active_contacts():
+    """What remains of the wrench is rounding, in whatever direction."""
+    robot = dynacom.load_robot("talos").dynacom()
+    model = robot.getModel()
+    fall = np.zeros(model.nv)
+    fall[2] = -9.81
+    robot.computeDynamics(pin.neutral(model), np.zeros(model.nv), fall)
+    wrench = robot.getGroundCoMForce(), robot.getGroundCoMTorque()
+    assert robot.distributeForce(*wrench, robot.getCoM()) == dynacom.DistributionStatus.Solved
+    assert np.abs(robot.allForces()).max() < 1e-9

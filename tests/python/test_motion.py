@@ -558,3 +558,11 @@ def test_robot_before_initialize(motion):
     nothing = ContactSchedule([], np.zeros((FRAMES, 0), dtype=bool))
     with pytest.raises(NotReadyError, match=r"DynaCoM .* before initialize\(\)"):
         dynacom.analyzeMotion(DynaCoM(), motion, nothing)
+
+
+def test_quaternions_that_are_none(model, arrays):
+    for factor in (0.0, 1.1):
+        q = arrays["q"].copy()
+        q[2, 3:7] *= factor
+        with pytest.raises(ValueError, match="q must have quaternions of norm 1, .* in frame 2"):
+            Motion(**arrays | {"q": q}).validate(model)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-2-Clause
 import copy
+import re
 import sys
 import warnings
 from pathlib import Path
@@ -436,3 +437,14 @@ def test_bad_urdf(robot_file):
     path = robot_file(with_contacts(POINT))
     (path.parent / "urdf" / "cart.urdf").write_text("<robot")
     refuses(path, "urdf: ")
+
+
+def test_the_file_that_the_documents_show(root, tmp_path):
+    """The robot of docs/files.md is one."""
+    (text,) = re.findall(r"^```yaml\n(.*?)^```$", (root / "docs/files.md").read_text(), re.M | re.S)
+    path = tmp_path / "shown.yaml"
+    path.write_text(text)
+    robot = load_robot(path)
+    assert list(robot.contacts) == ["left_sole", "ball"]
+    assert robot.contacts["left_sole"].frame_name == "left_sole_contact"
+    assert robot.contacts["ball"].world_aligned
