@@ -107,9 +107,9 @@ void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E
     qr_.compute(E);
     qr_.setThreshold(kDependent);
     q_ = equalities_ = qr_.rank();
+    R_.topLeftCorner(q_, q_) = qr_.matrixQR().topLeftCorner(q_, q_);
+    for (Eigen::Index k = 0; k < q_; ++k) rhs_[k] = d[qr_.colsPermutation().indices()[k]];
   }
-  R_.topLeftCorner(q_, q_) = qr_.matrixQR().topLeftCorner(q_, q_);
-  for (Eigen::Index k = 0; k < q_; ++k) rhs_[k] = d[qr_.colsPermutation().indices()[k]];
 
   // As computeSolution(), but without J, which many problems never need.
   x_.setZero();

@@ -46,8 +46,8 @@ double leastNormByEnumeration(const Problem& problem, VectorXd& x) {
     VectorXd point = VectorXd::Zero(n);
     if (size > 0)
       point = N.leftCols(size).transpose().completeOrthogonalDecomposition().solve(rhs.head(size));
-    const bool reaches =
-        (N.leftCols(size).transpose() * point - rhs.head(size)).norm() <= 1e-9 * (1. + rhs.norm());
+    const bool reaches = (N.leftCols(size).transpose() * point - rhs.head(size)).norm() <=
+                         1e-9 * (1. + point.norm());
     const bool respects = m == 0 || (problem.G.transpose() * point - problem.h).maxCoeff() <= 1e-9;
     if (reaches && respects && point.norm() < least) {
       least = point.norm();
