@@ -118,8 +118,9 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
     for (std::size_t k = 0; k < contacts.size(); ++k) {
       const ContactBase& contact = *contacts[k];
       result.contacts[k].wrench.col(frame).head(contact.cols()) = contact.appliedForce();
-      result.contacts[k].vertical_force[frame] = contact.toCoMForces().z();
-      result.residual.col(frame) -= contact.toCoMForces();
+      const DynaCoM::Vector6 given = contact.toCoMForces();
+      result.contacts[k].vertical_force[frame] = given.z();
+      result.residual.col(frame) -= given;
     }
     if (settings.progress && (frame + 1) % kProgressFrames == 0) settings.progress(frame + 1);
   }
