@@ -9,12 +9,13 @@ namespace dynacom::internal {
 
 namespace {
 
-// A normal whose part outside the span of others is shorter than this, relative to its length,
-// depends on them.
+// A normal whose part outside the span of others is shorter than this depends on them: for
+// inequalities relative to its length.
 constexpr double kDependent = 1e-12;
+constexpr double kDependentEquality = 1e-10;
 // An inequality that depends on active ones contradicts them if it is violated by more than this
-// part of what rounding in them can make of it.
-constexpr double kContradiction = 1e-9;
+// many tolerances, times what the tolerances of the active ones add up to in it.
+constexpr double kContradiction = 1e3;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Far above what has been seen, 120 for 88 inequalities.
@@ -27,10 +28,20 @@ MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& 
                                        const Eigen::Ref<const Eigen::MatrixXd>& G,
                                        const Eigen::Ref<const Eigen::VectorXd>& h,
                                        double tolerance) {
-  startWithEqualities(E, d);
+  iterations_ = 0;
+  y_.resize(E.cols());
+  z_.resize(G.cols());
   implied_.clear();
   implied_.reserve(G.cols());
-  int iterations = 0;
+  startWithEqualities(E, d);
+  const Status status = activateViolated(G, h, tolerance);
+  readMultipliers();
+  return status;
+}
+
+MinimumNorm::Status MinimumNorm::activateViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
+                                                  const Eigen::Ref<const Eigen::VectorXd>& h,
+                                                  double tolerance) {
   for (bool refined = true;;) {
     const Eigen::Index violated = findViolated(G, h, tolerance);
     if (violated < 0) {
@@ -41,14 +52,12 @@ MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& 
       continue;
     }
     refined = false;
-    if (iterations == 0) {
-      J_.setIdentity();
-      applyQ(J_);
-    }
+    completeBasis();
 
     double multiplier = 0.;
     for (bool done = false; !done;) {
-      if (++iterations > iterationLimit(G.cols())) return Status::IterationLimit;
+      if (iterations_ == iterationLimit(G.cols())) return Status::IterationLimit;
+      ++iterations_;
       computeDirections(G.col(violated));
       // The whole step reaches the inequality; on the way, the multiplier of an active one may
       // reach zero.
@@ -69,7 +78,8 @@ MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& 
       if (step == kInfinity) {
         // The inequality follows from the active ones, and none of them can leave: either it
         // contradicts them, or all that it lacks is rounding.
-        if (violation > kContradiction * (1. + r_.head(q_).lpNorm<1>())) return Status::Infeasible;
+        if (violation > kContradiction * tolerance * (1. + r_.head(q_).lpNorm<1>()))
+          return Status::Infeasible;
         implied_.push_back(violated);
         break;
       }
@@ -101,23 +111,33 @@ void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E
   workspace_.resize(n);
   active_.clear();
   active_.reserve(n);
+  complete_ = false;
 
   q_ = equalities_ = 0;
   if (E.cols() > 0) {  // Eigen's decomposition wants one
     qr_.compute(E);
-    qr_.setThreshold(kDependent);
+    // Eigen's threshold is relative to the largest pivot, which may be nothing but rounding.
+    qr_.setThreshold(kDependentEquality / std::max(qr_.maxPivot(), kDependentEquality));
     q_ = equalities_ = qr_.rank();
     R_.topLeftCorner(q_, q_) = qr_.matrixQR().topLeftCorner(q_, q_);
     for (Eigen::Index k = 0; k < q_; ++k) rhs_[k] = d[qr_.colsPermutation().indices()[k]];
   }
 
-  // As computeSolution(), but without J, which many problems never need.
+  // As computeSolution(), but without J.
   x_.setZero();
   x_.head(q_) = rhs_.head(q_);
   R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>().transpose().solveInPlace(x_.head(q_));
   u_.head(q_) = -x_.head(q_);
   R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>().solveInPlace(u_.head(q_));
   applyQ(x_);
+}
+
+// Computes J, which problems without active inequalities never need.
+void MinimumNorm::completeBasis() {
+  if (complete_) return;
+  J_.setIdentity();
+  applyQ(J_);
+  complete_ = true;
 }
 
 // Multiplies by Q of the equalities' decomposition: Eigen's own way to do so allocates.
@@ -198,6 +218,13 @@ void MinimumNorm::computeSolution() {
   x_.noalias() = J_.leftCols(q_) * r_.head(q_);
   u_.head(q_) = -r_.head(q_);
   R.solveInPlace(u_.head(q_));
+}
+
+void MinimumNorm::readMultipliers() {
+  y_.setZero();
+  for (Eigen::Index k = 0; k < equalities_; ++k) y_[qr_.colsPermutation().indices()[k]] = u_[k];
+  z_.setZero();
+  for (Eigen::Index k = equalities_; k < q_; ++k) z_[active_[k - equalities_]] = u_[k];
 }
 
 }  // namespace dynacom::internal

@@ -23,7 +23,8 @@ class MinimumNorm {
   enum class Status { Solved, Infeasible, IterationLimit };
 
   /// Solves the problem.
-  /// @param E, d       equalities, n × p and p; the columns of E have unit length
+  /// @param E, d       equalities, n × p and p; the columns of E have about unit length, or they
+  ///                   are zero, up to rounding
   /// @param G, h       inequalities, n × m and m
   /// @param tolerance  by how much Gᵀ x may exceed h
   Status solve(const Eigen::Ref<const Eigen::MatrixXd>& E,
@@ -33,10 +34,20 @@ class MinimumNorm {
 
   /// The solution, n.
   const Eigen::VectorXd& x() const { return x_; }
+  /// Multipliers of the equalities, p, and of the inequalities, m: x + E y + G z = 0.
+  const Eigen::VectorXd& y() const { return y_; }
+  const Eigen::VectorXd& z() const { return z_; }
+  /// The active inequalities.
+  const std::vector<Eigen::Index>& active() const { return active_; }
+  /// How often an inequality was made active, or left.
+  int iterations() const { return iterations_; }
 
  private:
   void startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E,
                            const Eigen::Ref<const Eigen::VectorXd>& d);
+  void completeBasis();
+  Status activateViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
+                          const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance);
   template <class Matrix>
   void applyQ(Matrix& matrix);
   Eigen::Index findViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
@@ -45,16 +56,19 @@ class MinimumNorm {
   void activate(Eigen::Index inequality, double rhs, double multiplier);
   void leave(Eigen::Index position);
   void computeSolution();
+  void readMultipliers();
 
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr_;  // of the equalities
   // J is orthogonal. Its first q columns span the normals N of the active constraints, equalities
   // first: N = J₁ R.
   Eigen::MatrixXd J_, R_;
+  bool complete_ = false;  // whether J has been computed
   Eigen::Index q_ = 0, equalities_ = 0;
   std::vector<Eigen::Index> active_;   // inequalities, in the order of R
   std::vector<Eigen::Index> implied_;  // inequalities that follow from active ones, up to rounding
-  Eigen::VectorXd rhs_;                // of the active constraints, in the order of R
-  Eigen::VectorXd x_;
+  int iterations_ = 0;
+  Eigen::VectorXd rhs_;  // of the active constraints, in the order of R
+  Eigen::VectorXd x_, y_, z_;
   Eigen::VectorXd u_;      // multipliers: x + N u = 0
   Eigen::VectorXd Jn_;     // Jᵀ times the normal at hand
   Eigen::VectorXd r_;      // minus the change of u for a unit of the new multiplier

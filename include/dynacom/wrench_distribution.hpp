@@ -3,22 +3,29 @@
 
 #include <Eigen/Core>
 #include <iosfwd>
+#include <limits>
 #include <memory>
+#include <vector>
 
 #include "dynacom/contact_base.hpp"
 
 namespace dynacom {
 
-/// How a distribution ended.
+/// How a distribution ended. Whatever it says, the forces lie within all inequalities.
 enum class DistributionStatus {
-  /// The forces sum to the wrench, respect every inequality, and are the cheapest that do.
+  /// The wrench can be reached: its distance to what the contacts can give is at most 1e-8 of the
+  /// scale. The forces give it, and are the cheapest that do.
   Solved,
-  /// No forces within the inequalities sum to the wrench. The forces are zero.
-  Infeasible,
-  /// There is no contact to give a force.
+  /// The wrench is out of reach. The forces give the closest one that the contacts can give, and
+  /// are the cheapest that do.
+  Relaxed,
+  /// There is no contact, and the wrench is not zero (1e-8 of the scale is).
   NoContact,
-  /// A number was not finite, the iterations were used up, or the solver's answer did not pass the
-  /// check. The forces are zero.
+  /// A number that came in was not finite. The forces are those of the last Solved or Relaxed, if
+  /// contacts and settings are still the same, else zero.
+  InvalidInput,
+  /// The iterations were used up, or the answer did not pass the check. The forces are as for
+  /// InvalidInput.
   NumericalFailure,
 };
 
@@ -26,38 +33,129 @@ enum class DistributionStatus {
 DYNACOM_EXPORT const char* to_string(DistributionStatus status);
 DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, DistributionStatus status);
 
+/// What a distribution was asked, and what it answered.
+///
+/// Wrenches w are (force [N], moment [N·m]) about the CoM in the world's axes; their size is the
+/// norm ‖D w‖ with D = diag(wrench_weights). Before the first solve() numbers are NaN.
+struct DYNACOM_EXPORT DistributionResult {
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+  /// One contact's share of the problem, and of the answer.
+  struct Contact {
+    Eigen::MatrixXd A;        ///< its inequalities A λ ≤ 0: unilaterality, then friction; m × n
+    Eigen::VectorXd weights;  ///< wᵢ of the cost ½ Σ (wᵢ λᵢ)², n
+    Eigen::Matrix<double, 6, Eigen::Dynamic> NE;  ///< takes λ to the wrench about the CoM, 6 × n
+    Eigen::VectorXd force;                        ///< λ, in the surface's frame, n
+    /// Which inequalities hold as equations in the answer, m.
+    Eigen::Array<bool, Eigen::Dynamic, 1> active;
+    /// Multipliers μ of the inequalities in the minimum of the cost, m: zero where one is not
+    /// active; ≥ 0, but for those that the relaxation multiplies, which are equations there.
+    Eigen::VectorXd multipliers;
+    /// Multipliers μ' ≥ 0 of the inequalities in the relaxation, m: where one is positive, all
+    /// forces that come as close to the wrench lie on that inequality's bound. Zero unless Relaxed.
+    Eigen::VectorXd relaxation_multipliers;
+  };
+
+  static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+  DistributionStatus status = DistributionStatus::NoContact;
+  Vector6 wrench = Vector6::Constant(kNaN);    ///< what was asked for
+  Vector6 achieved = Vector6::Constant(kNaN);  ///< what the forces give, Σ NE λ
+  Vector6 residual = Vector6::Constant(kNaN);  ///< wrench − achieved
+  Vector6 wrench_weights = Vector6::Ones();    ///< D
+  double scale = kNaN;                         ///< what tolerances are relative to [N]
+  double cost = kNaN;                          ///< ½ Σ (wᵢ λᵢ)²
+  int iterations = 0;                          ///< of the active-set method, in both stages
+  std::vector<Contact> contacts;               ///< in the order of WrenchDistribution::add()
+  /// Multipliers ν of NE λ = achieved in the minimum of the cost: W² λ = NEᵀ ν − Aᵀ μ.
+  Vector6 wrench_multipliers = Vector6::Constant(kNaN);
+
+  /// The forces λ of all contacts, one behind the other.
+  Eigen::VectorXd forces() const;
+
+  /// Whether the answer is optimal, judged by what stands in this result alone: the forces respect
+  /// the inequalities; they are the cheapest that give the achieved wrench (stationarity, signs and
+  /// complementarity of ν and μ); and the residual r is none, or it is orthogonal to what is
+  /// achieved and in the polar of the cone of wrenches that the contacts can give,
+  /// NEᵀ D² r = Aᵀ μ' with μ' ≥ 0, so that no reachable wrench is closer.
+  /// @param tolerance  of each of these, relative to the terms that it compares
+  /// @return false for InvalidInput and NumericalFailure, and before the first solve()
+  bool isOptimal(double tolerance = 1e-6) const;
+};
+
+/// How far a wrench is from what the contacts cannot give.
+struct DYNACOM_EXPORT WrenchMargin {
+  /// The largest s for which the wrench stays within reach when s, divided by the axis's wrench
+  /// weight, is added to or taken from any one of its components [N]. 0 if it is out of reach or
+  /// the contacts cannot give some component at all; infinite if they can give any wrench; NaN if
+  /// there is no answer (InvalidInput, NumericalFailure).
+  double margin = std::numeric_limits<double>::quiet_NaN();
+  /// The component that gives way first, 0 … 5, and the sign of what is added to it; −1 and 0 where
+  /// the margin is infinite or NaN, or the wrench out of reach.
+  int axis = -1;
+  int sign = 0;
+};
+
 /// How contacts share a wrench: the quadratic program of equations (9–13),
 ///
-///     minimise ½ Σ (wᵢ λᵢ)²   subject to   U λ ≤ u,   C λ ≤ c,   NE λ = w
+///     minimise ½ Σ (wᵢ λᵢ)²   subject to   U λ ≤ 0,   C λ ≤ 0,   NE λ = w
 ///
-/// Usage: clear(), add() every contact, solve(), forces(). What is added is copied; nothing is
+/// and where no forces do that, in two stages: first the reachable wrench closest to w in the norm
+/// ‖D w‖, then the cheapest forces that give it.
+///
+/// Usage: clear(), add() every contact, solve(), result(). What is added is copied; nothing is
 /// allocated once a problem of the same sizes has been solved.
 class DYNACOM_EXPORT WrenchDistribution {
  public:
+  using Vector6 = DistributionResult::Vector6;
+
   WrenchDistribution();
   WrenchDistribution(const WrenchDistribution& other);
   WrenchDistribution(WrenchDistribution&&) noexcept;
   WrenchDistribution& operator=(WrenchDistribution other) noexcept;
   ~WrenchDistribution();
 
-  /// Begins a new problem, without contacts.
+  /// Weights D of the norm in which the closest wrench is the closest: three of the force, three of
+  /// the moment [1/m]. All 1 by default: 1 for forces, 1/ℓ for moments with ℓ = 1 m.
+  /// @throws std::invalid_argument unless all are finite and > 0
+  void setWrenchWeights(const Vector6& weights);
+  const Vector6& getWrenchWeights() const;
+
+  /// Begins a new problem, without contacts. Forces that a solve() without an answer would keep are
+  /// not forgotten: they are compared with what is added next.
   void clear();
 
-  /// Adds a contact, with the matrices that it has now; its force takes the next cols() components
-  /// of forces().
-  /// @throws std::invalid_argument if the contact was never initialised
+  /// Adds a contact, with the matrices that it has now.
+  /// @throws std::invalid_argument if the contact was never initialised, or its uni_b() or fri_b()
+  ///         is not zero
   void add(const ContactBase& contact);
 
-  /// Solves for the forces that give a wrench.
-  /// @param wrench        (force [N], moment [N·m]) about the CoM, world axes
-  /// @param minimalScale  tolerances are relative to the norm of the wrench, but at least to this,
-  ///                      ≥ 0 [N]: the robot's weight, say, so that a free fall, where the wrench
-  ///                      is all rounding, is one
-  DistributionStatus solve(const Eigen::Matrix<double, 6, 1>& wrench, double minimalScale = 0.);
+  /// Adds a contact by its matrices.
+  /// @param A        inequalities A λ ≤ 0, m × n
+  /// @param weights  wᵢ > 0 of the cost, n
+  /// @param NE       takes λ to the wrench about the CoM, 6 × n
+  /// @throws std::invalid_argument if the sizes do not fit, n is 0, A is not finite, or a weight is
+  ///         not finite and > 0
+  void add(const Eigen::Ref<const Eigen::MatrixXd>& A,
+           const Eigen::Ref<const Eigen::VectorXd>& weights,
+           const Eigen::Ref<const Eigen::Matrix<double, 6, Eigen::Dynamic>>& NE);
 
-  /// The forces λ of all contacts, in the order of add(), each in its surface's frame; zero unless
-  /// solve() returned DistributionStatus::Solved.
-  const Eigen::VectorXd& forces() const;
+  /// Solves for the forces that give a wrench, or the closest to it.
+  /// @param wrench        (force [N], moment [N·m]) about the CoM, world axes
+  /// @param minimalScale  the scale, which tolerances are relative to, is ‖D w‖, but at least this
+  ///                      [N]: the robot's weight, say, so that a free fall, where the wrench is
+  ///                      all rounding, is one
+  DistributionStatus solve(const Vector6& wrench, double minimalScale = 0.);
+
+  /// The last solve()'s answer. clear() and add() change its contacts, solve() makes it whole.
+  const DistributionResult& result() const;
+
+  /// Forgets the answer: result() is as before the first solve(), without contacts.
+  void reset();
+
+  /// How far the last solve()'s wrench is from what the contacts cannot give: up to twelve small
+  /// problems, too much for a control loop.
+  WrenchMargin computeMargin();
 
  private:
   struct Workspace;

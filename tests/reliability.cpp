@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-2-Clause
+// Distributes random wrenches, certifies every answer, and prints what came out, sort by sort.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "problem_checker.hpp"
+#include "random_problems.hpp"
+
+using namespace dynacom_tests;
+using dynacom::DistributionStatus;
+
+namespace {
+
+struct Tally {
+  long problems = 0, solved = 0, relaxed = 0, failures = 0, wrong = 0, doubtful = 0,
+       not_optimal = 0;
+  int iterations = 0;
+  Verdict worst;
+
+  void add(const dynacom::DistributionResult& result, const Verdict& verdict) {
+    ++problems;
+    solved += result.status == DistributionStatus::Solved;
+    relaxed += result.status == DistributionStatus::Relaxed;
+    failures += result.status == DistributionStatus::NumericalFailure;
+    wrong += !verdict.error.empty();
+    doubtful += verdict.doubtful;
+    not_optimal += !result.isOptimal(1e-6);
+    iterations = std::max(iterations, result.iterations);
+    worst.outside_cone = std::max(worst.outside_cone, verdict.outside_cone);
+    worst.residual_gap = std::max(worst.residual_gap, verdict.residual_gap);
+    if (!verdict.doubtful) worst.cost_gap = std::max(worst.cost_gap, verdict.cost_gap);
+    if (result.status == DistributionStatus::Solved)
+      worst.residual = std::max(worst.residual, verdict.residual);
+  }
+
+  void print(const char* name) const {
+    std::printf(
+        "| %s | %ld | %ld | %ld | %ld | %ld | %ld | %ld | %.1e | %.1e | %.1e | %.1e | %d |\n", name,
+        problems, solved, relaxed, failures, wrong, doubtful, not_optimal, worst.outside_cone,
+        worst.residual, worst.residual_gap, worst.cost_gap, iterations);
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const long problems = argc > 1 ? std::atol(argv[1]) : 1000;
+  const unsigned long seed = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1;
+  ProblemGenerator generator(seed);
+  std::array<Tally, kPlaceNames.size()> tallies;
+  Tally all;
+  for (long i = 0; i < problems; ++i) {
+    const Problem problem = generator.next();
+    dynacom::WrenchDistribution distribution;
+    distribution.setWrenchWeights(problem.wrench_weights);
+    for (const auto& contact : problem.makeContacts()) distribution.add(*contact);
+    distribution.solve(problem.wrench, problem.minimal_scale);
+    const Verdict verdict = check(problem, distribution.result());
+    all.add(distribution.result(), verdict);
+    tallies[static_cast<std::size_t>(problem.place)].add(distribution.result(), verdict);
+    if (!verdict.error.empty() && all.wrong <= 20)
+      std::fprintf(stderr,
+                   "problem %ld (%s, %zu contacts): %s; outside %.1e, residual %.1e (gap %.1e), "
+                   "cost gap %.1e\n",
+                   i, kPlaceNames[static_cast<std::size_t>(problem.place)], problem.contacts.size(),
+                   verdict.error.c_str(), verdict.outside_cone, verdict.residual,
+                   verdict.residual_gap, verdict.cost_gap);
+  }
+  std::printf(
+      "| wrench | problems | Solved | Relaxed | failures | wrong | doubtful | not optimal | "
+      "outside cone | "
+      "residual of Solved | residual gap | cost gap | iterations |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (std::size_t i = 0; i < tallies.size(); ++i) tallies[i].print(kPlaceNames[i]);
+  all.print("all");
+  return all.wrong + all.not_optimal > 0 ? 1 : 0;
+}
