@@ -12,9 +12,16 @@ CentroidalWrench groundWrench(const CentroidalState& state, const Eigen::VectorX
                              toVector<6>("extWrench", ext_wrench));
 }
 
+CentroidalState applyWrench(const CentroidalState& state, const CentroidalWrench& wrench,
+                            const Eigen::VectorXd& gravity, const Eigen::VectorXd& ext_wrench) {
+  return applyGroundWrench(state, wrench, toVector<3>("gravity", gravity),
+                           toVector<6>("extWrench", ext_wrench));
+}
+
 Eigen::Vector2d flatGroundCoP(const CentroidalWrench& wrench, const Eigen::VectorXd& com,
-                              double ground_height) {
-  return computeFlatGroundCoP(wrench, toVector<3>("com", com), ground_height);
+                              double ground_height, double minimal_vertical_force) {
+  return computeFlatGroundCoP(wrench, toVector<3>("com", com), ground_height,
+                              minimal_vertical_force);
 }
 
 }  // namespace
@@ -57,10 +64,16 @@ void exposeCentroidal() {
           "Newton and Euler, equations (1, 2): the wrench about c that the ground must give,\n"
           "f = m (d²c/dt² - g) - f_e and tau = dL/dt - tau_e.\n\n"
           "gravity: (3,), world [m/s²]; extWrench: (6,), force [N] and moment [N·m] about c.");
+  bp::def("applyGroundWrench", &applyWrench,
+          (bp::arg("state"), bp::arg("groundWrench"), bp::arg("gravity"),
+           bp::arg("extWrench") = Eigen::VectorXd(Eigen::VectorXd::Zero(6))),
+          "The inverse of computeGroundWrench: the state, with the accelerations that a ground\n"
+          "wrench causes, (f + f_e)/m + g and tau + tau_e.");
   bp::def("computeFlatGroundCoP", &flatGroundCoP,
-          (bp::arg("groundWrench"), bp::arg("com"), bp::arg("groundHeight") = 0.),
+          (bp::arg("groundWrench"), bp::arg("com"), bp::arg("groundHeight") = 0.,
+           bp::arg("minimalVerticalForce") = kMinimalVerticalForce),
           "Centre of pressure on flat horizontal ground, equation (5), (2,), world [m]; NaN where\n"
-          "the vertical force is below 1 N.");
+          "the vertical force is below minimalVerticalForce [N].");
   bp::def("computeVRP", &computeVRP, (bp::arg("state"), bp::arg("omega")),
           "Virtual repellent point c - d²c/dt² / omega², equation (7), (2,) [m].\n\n"
           "omega: > 0 [rad/s], else ValueError.");

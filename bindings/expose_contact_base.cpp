@@ -73,7 +73,17 @@ void exposeContactBase() {
            "The same about the centre of mass of the last updateNewtonEuler.")
       .def("getCoP", &ContactBase::getCoP, bp::arg("self"),
            "Centre of pressure in the surface's plane, (2,) [m]; NaN unless the normal force is\n"
-           "positive.");
+           "positive.")
+      .def("getFrictionUsage", &ContactBase::getFrictionUsage, bp::arg("self"),
+           "The larger of |f_x| and |f_y| over mu f_z, 1 on the pyramid: 0 where there is no "
+           "force,\n"
+           "infinite where there is one without a positive normal force, NaN without friction.")
+      .def("getCoPMargin", &ContactBase::getCoPMargin, bp::arg("self"),
+           "Distance of getCoP() to the nearest edge, negative beyond it [m]; NaN unless the "
+           "normal\n"
+           "force is positive, and for points.")
+      .def("getYawUsage", &ContactBase::getYawUsage, bp::arg("self"),
+           "|tau_z| over gu f_z, as getFrictionUsage; NaN for points.");
 }
 
 }  // namespace dynacom::python

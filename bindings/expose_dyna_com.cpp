@@ -84,13 +84,24 @@ void exposeDynaCoM() {
            "Height of the flat horizontal ground [m].")
       .def("setGroundHeight", &DynaCoM::setGroundHeight, (bp::arg("self"), bp::arg("groundHeight")),
            "Height of the flat horizontal ground, finite [m].")
+      .def("getMinimalVerticalForce", &DynaCoM::getMinimalVerticalForce, bp::arg("self"),
+           "Below this vertical force a centre of pressure means nothing [N]; 1 by default.")
+      .def("setMinimalVerticalForce", &DynaCoM::setMinimalVerticalForce,
+           (bp::arg("self"), bp::arg("minimalVerticalForce")),
+           "ValueError unless minimalVerticalForce is finite and > 0 [N].")
+      .def("getWrenchWeights", &DynaCoM::getWrenchWeights, bp::arg("self"), Copied(),
+           "Weights of the norm in which a wrench out of reach is replaced by the closest, (6,).")
+      .def(
+          "setWrenchWeights", method<DynaCoM>(&DynaCoM::setWrenchWeights, "weights"),
+          "Three of the force, three of the moment [1/m]; all 1 by default. ValueError unless all\n"
+          "are finite and > 0.")
 
       .def("computeDynamics", &computeDynamics,
            (bp::arg("self"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
             bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
            "Computes the centroidal state, the ground wrench (1, 2), the placements of the\n"
            "contacts and the centre of pressure: by (5) on flat horizontal ground, else by (6),\n"
-           "after distributing the wrench.\n\n"
+           "after distributing the wrench. All results are NaN if a number is not finite.\n\n"
            "q: (nq,); v: (nv,); a: (nv,); extWrench: (6,), force [N] and moment [N·m] about the\n"
            "centre of mass. Raises ValueError if one has another size.")
       .def("getGroundCoMForce", &DynaCoM::getGroundCoMForce, bp::arg("self"), Copied(),
@@ -105,12 +116,20 @@ void exposeDynaCoM() {
       .def("getAMVariation", &DynaCoM::getAMVariation, bp::arg("self"), Copied(),
            "Its rate, (3,) [N·m].")
       .def("getCoP", &DynaCoM::getCoP, bp::arg("self"), Copied(),
-           "Centre of pressure, (2,) [m]; NaN where the vertical force is below 1 N or, on uneven\n"
-           "ground, the wrench was not distributed.")
+           "Centre of pressure, (2,) [m]; NaN unless isCoPDefined().")
+      .def("isCoPDefined", &DynaCoM::isCoPDefined, bp::arg("self"),
+           "Whether the vertical force is getMinimalVerticalForce() or more.")
+      .def(
+          "getFeasibleACoM", &DynaCoM::getFeasibleACoM, bp::arg("self"), Copied(),
+          "Acceleration of the centre of mass that the contacts can really cause, (3,) [m/s²]: by\n"
+          "what the last distribution since computeDynamics achieved; NaN before.")
+      .def("getFeasibleAMVariation", &DynaCoM::getFeasibleAMVariation, bp::arg("self"), Copied(),
+           "The same for the rate of the angular momentum, (3,) [N·m].")
       .def<void (DynaCoM::*)(double)>(
           "computeNL", &DynaCoM::computeNL, (bp::arg("self"), bp::arg("omega")),
           "Computes virtual repellent point and non-linearity, (7, 8), of the last\n"
-          "computeDynamics. omega: > 0 [rad/s], else ValueError.")
+          "computeDynamics; where that has distributed the wrench, with getFeasibleACoM().\n"
+          "omega: > 0 [rad/s], else ValueError.")
       .def("computeNL", &computeNL,
            (bp::arg("self"), bp::arg("omega"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
             bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
@@ -148,15 +167,36 @@ void exposeDynaCoM() {
       .def("getKnownContacts", &getKnownContacts, bp::arg("self"),
            "Names of all contacts: the active ones, then the others.")
 
-      .def("distributeForce", &distributeForce,
-           (bp::arg("self"), bp::arg("groundCoMForce"), bp::arg("groundCoMTorque"), bp::arg("com")),
-           "Shares a wrench between the active contacts, placed by getData(): the cheapest forces\n"
-           "within all inequalities that give it, (9-13). Each contact is given its force, zero\n"
-           "unless solved. Returns the DistributionStatus.\n\n"
-           "groundCoMForce: (3,) [N]; groundCoMTorque: (3,), about the centre of mass [N·m];\n"
-           "com: (3,) [m].")
+      .def(
+          "distributeForce", &distributeForce,
+          (bp::arg("self"), bp::arg("groundCoMForce"), bp::arg("groundCoMTorque"), bp::arg("com")),
+          "Shares a wrench between the active contacts, placed by getData(): the cheapest forces\n"
+          "within all inequalities that give it, (9-13), or the closest that they can give. Each\n"
+          "contact is given its force. Returns the DistributionStatus; getDistribution() has all.\n"
+          "\n"
+          "groundCoMForce: (3,) [N]; groundCoMTorque: (3,), about the centre of mass [N·m];\n"
+          "com: (3,) [m].")
+      .def("getDistribution", &DynaCoM::getDistribution, bp::arg("self"), Copied(),
+           "The last distribution, a DistributionResult, a copy; its contacts are those that were\n"
+           "active then, in the order of their activation.")
       .def("getDistributionStatus", &DynaCoM::getDistributionStatus, bp::arg("self"),
-           "How the last distribution ended.")
+           "How the last distribution ended; NoContact before the first.")
+      .def("computeWrenchMargin", &DynaCoM::computeWrenchMargin, bp::arg("self"),
+           "How far the last distribution's wrench is from what the contacts cannot give: a\n"
+           "WrenchMargin. For a look, not for a control loop.")
+      .def("getContactCoP", &DynaCoM::getContactCoP, (bp::arg("self"), bp::arg("name")),
+           "A contact's centre of pressure in its surface's plane, (2,) [m]; NaN where its normal\n"
+           "force is below getMinimalVerticalForce(). ValueError if the name is not known.")
+      .def("getContactFrictionUsage", &DynaCoM::getContactFrictionUsage,
+           (bp::arg("self"), bp::arg("name")),
+           "The contact's getFrictionUsage(); 0 where its normal force is below\n"
+           "getMinimalVerticalForce(). ValueError if the name is not known.")
+      .def("getContactCoPMargin", &DynaCoM::getContactCoPMargin, (bp::arg("self"), bp::arg("name")),
+           "The contact's getCoPMargin() [m]; NaN where its normal force is below\n"
+           "getMinimalVerticalForce(). ValueError if the name is not known.")
+      .def("getContactYawUsage", &DynaCoM::getContactYawUsage, (bp::arg("self"), bp::arg("name")),
+           "The contact's getYawUsage(); 0 where its normal force is below\n"
+           "getMinimalVerticalForce(). ValueError if the name is not known.")
       .def("uni_A", DYNACOM_MATRIX(DynaCoM, uni_A), bp::arg("self"),
            "Unilaterality of the active contacts, block-diagonal.")
       .def("uni_b", &DynaCoM::uni_b, bp::arg("self"), "Right-hand side of unilaterality, zero.")

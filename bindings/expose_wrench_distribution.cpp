@@ -6,44 +6,162 @@ namespace dynacom::python {
 
 namespace {
 
+using Contact = DistributionResult::Contact;
+
+void addMatrices(WrenchDistribution& self, const Eigen::MatrixXd& A, const Eigen::VectorXd& weights,
+                 const Eigen::MatrixXd& NE) {
+  internal::requireSize("NE", NE.rows(), Eigen::Index(6), "rows");
+  self.add(A, weights, NE);
+}
+
 DistributionStatus solve(WrenchDistribution& self, const Eigen::VectorXd& wrench,
                          double minimal_scale) {
   return self.solve(toVector<6>("wrench", wrench), minimal_scale);
 }
 
+bp::list getContacts(const DistributionResult& self) {
+  bp::list contacts;
+  for (const Contact& contact : self.contacts) contacts.append(contact);
+  return contacts;
+}
+
+bp::object getA(const Contact& self) { return toArray(self.A); }
+bp::object getNE(const Contact& self) { return toArray(self.NE); }
+bp::object getActive(const Contact& self) {
+  return bp::object(Eigen::Matrix<bool, Eigen::Dynamic, 1>(self.active.matrix()));
+}
+
 }  // namespace
 
 void exposeWrenchDistribution() {
-  bp::enum_<DistributionStatus>("DistributionStatus",
-                                "How a distribution ended.\n\n"
-                                "Solved: the forces sum to the wrench, respect every inequality,\n"
-                                "and are the cheapest that do.\n"
-                                "Infeasible: no forces within the inequalities sum to it.\n"
-                                "NoContact: there is no contact to give a force.\n"
-                                "NumericalFailure: a number was not finite, the iterations were\n"
-                                "used up, or the answer did not pass the check.\n\n"
-                                "The forces are zero in all but the first.")
+  bp::enum_<DistributionStatus>(
+      "DistributionStatus",
+      "How a distribution ended. Whatever it says, the forces lie within all inequalities.\n\n"
+      "Solved: the wrench can be reached, its distance to what the contacts can give is at most\n"
+      "1e-8 of the scale; the forces give it and are the cheapest that do.\n"
+      "Relaxed: it is out of reach; the forces give the closest that the contacts can give, and\n"
+      "are the cheapest that do.\n"
+      "NoContact: there is no contact, and the wrench is not zero.\n"
+      "InvalidInput: a number that came in was not finite; the forces are those of the last "
+      "answer\n"
+      "if contacts and settings are still the same, else zero.\n"
+      "NumericalFailure: the iterations were used up, or the answer did not pass the check; the\n"
+      "forces are as for InvalidInput.")
       .value("Solved", DistributionStatus::Solved)
-      .value("Infeasible", DistributionStatus::Infeasible)
+      .value("Relaxed", DistributionStatus::Relaxed)
       .value("NoContact", DistributionStatus::NoContact)
+      .value("InvalidInput", DistributionStatus::InvalidInput)
       .value("NumericalFailure", DistributionStatus::NumericalFailure);
+
+  {
+    const bp::scope result =
+        bp::class_<DistributionResult>("DistributionResult",
+                                       "What a distribution was asked, and what it answered.\n\n"
+                                       "Wrenches are (6,): force [N] and moment [N·m] about the "
+                                       "centre of mass, world axes;\n"
+                                       "their size is the norm of wrench_weights * wrench. Before "
+                                       "the first solve() numbers are NaN.",
+                                       bp::no_init)
+            .def_readonly("status", &DistributionResult::status, "DistributionStatus.")
+            .add_property("wrench", getter(&DistributionResult::wrench),
+                          "What was asked for, (6,).")
+            .add_property("achieved", getter(&DistributionResult::achieved),
+                          "What the forces give, (6,).")
+            .add_property("residual", getter(&DistributionResult::residual),
+                          "wrench - achieved, (6,).")
+            .add_property("wrench_weights", getter(&DistributionResult::wrench_weights),
+                          "Weights of the norm of wrenches, (6,).")
+            .def_readonly("scale", &DistributionResult::scale,
+                          "What tolerances are relative to [N].")
+            .def_readonly("cost", &DistributionResult::cost, "Half the sum of (w_i lambda_i)^2.")
+            .def_readonly("iterations", &DistributionResult::iterations,
+                          "Of the active-set method, in both stages.")
+            .add_property("contacts", &getContacts,
+                          "One DistributionResult.Contact each, in the order of add().")
+            .add_property("wrench_multipliers", getter(&DistributionResult::wrench_multipliers),
+                          "Multipliers nu of NE lambda = achieved, (6,):\n"
+                          "W^2 lambda = NE' nu - A' mu.")
+            .def("forces", &DistributionResult::forces, bp::arg("self"),
+                 "The forces of all contacts, one behind the other.")
+            .def("isOptimal", &DistributionResult::isOptimal,
+                 (bp::arg("self"), bp::arg("tolerance") = 1e-6),
+                 "Whether the answer is optimal, judged by what stands in this result alone:\n"
+                 "forces within the inequalities, the cheapest that give the achieved wrench, and\n"
+                 "no reachable wrench closer. False for InvalidInput and NumericalFailure, and\n"
+                 "before the first solve().\n\n"
+                 "tolerance: of each of these, relative to the terms that it compares.")
+            .def(CopyVisitor<DistributionResult>());
+
+    bp::class_<Contact>("Contact", "One contact's share of a problem, and of its answer.",
+                        bp::no_init)
+        .add_property("A", &getA,
+                      "Its inequalities A lambda <= 0: unilaterality, then friction; (m, n).")
+        .add_property("weights", getter(&Contact::weights), "Weights of the cost, (n,).")
+        .add_property("NE", &getNE, "Takes lambda to the wrench about the centre of mass, (6, n).")
+        .add_property("force", getter(&Contact::force), "lambda, in the surface's frame, (n,).")
+        .add_property("active", &getActive,
+                      "Which inequalities hold as equations in the answer, (m,) of bool.")
+        .add_property("multipliers", getter(&Contact::multipliers),
+                      "mu of the inequalities in the minimum of the cost, (m,): zero where one is\n"
+                      "not active; not negative, but for those that the relaxation multiplies.")
+        .add_property(
+            "relaxation_multipliers", getter(&Contact::relaxation_multipliers),
+            "mu' of the inequalities in the relaxation, (m,), not negative: where one is\n"
+            "positive, all forces that come as close to the wrench hold it as an\n"
+            "equation. Zero where no relaxation was needed.")
+        .def(CopyVisitor<Contact>());
+  }
+
+  bp::class_<WrenchMargin>("WrenchMargin",
+                           "How far a wrench is from what the contacts cannot give.", bp::no_init)
+      .def_readonly("margin", &WrenchMargin::margin,
+                    "The largest s for which the wrench stays within reach when s, divided by the\n"
+                    "axis's wrench weight, is added to or taken from any of its components [N]. 0\n"
+                    "out of reach or where some component cannot be given at all; infinite where\n"
+                    "any wrench can be given; NaN where there is no answer.")
+      .def_readonly("axis", &WrenchMargin::axis,
+                    "The component that gives way first, 0 to 5; -1 where the margin is infinite\n"
+                    "or NaN, or the wrench out of reach.")
+      .def_readonly("sign", &WrenchMargin::sign, "The sign of what is added to it; 0 likewise.");
 
   bp::class_<WrenchDistribution>(
       "WrenchDistribution",
       "How contacts share a wrench: the cheapest forces within all inequalities that give it,\n"
-      "equations (9-13). clear(), add() every contact, solve(), forces().",
+      "equations (9-13), or the closest wrench that the contacts can give. clear(), add() every\n"
+      "contact, solve(), result().",
       bp::init<>(bp::arg("self")))
-      .def("clear", &WrenchDistribution::clear, bp::arg("self"),
-           "Begins a new problem, without contacts.")
-      .def("add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact")),
-           "Adds a contact with the matrices that it has now.")
-      .def("solve", &solve, (bp::arg("self"), bp::arg("wrench"), bp::arg("minimalScale") = 0.),
-           "Solves for the forces that give a wrench, (6,): force [N], moment [N·m] about the\n"
-           "centre of mass, world axes. Tolerances are relative to its norm, but at least to\n"
-           "minimalScale [N]. Returns the DistributionStatus.")
-      .def("forces", &WrenchDistribution::forces, bp::arg("self"), Copied(),
-           "The forces of all contacts, in the order of add(), each in its surface's frame; zero\n"
-           "unless solved.")
+      .def("setWrenchWeights",
+           method<WrenchDistribution>(&WrenchDistribution::setWrenchWeights, "weights"),
+           "Weights of the norm in which the closest wrench is the closest, (6,): three of the\n"
+           "force, three of the moment [1/m]; all 1 by default. ValueError unless all are finite\n"
+           "and > 0.")
+      .def("getWrenchWeights", &WrenchDistribution::getWrenchWeights, bp::arg("self"), Copied(),
+           "Those weights, (6,).")
+      .def(
+          "clear", &WrenchDistribution::clear, bp::arg("self"),
+          "Begins a new problem, without contacts. If what is added next has the inequalities and\n"
+          "weights of before, a solve() without an answer keeps the forces of before.")
+      .def<void (WrenchDistribution::*)(const ContactBase&)>(
+          "add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact")),
+          "Adds a contact with the matrices that it has now.")
+      .def(
+          "add", &addMatrices, (bp::arg("self"), bp::arg("A"), bp::arg("weights"), bp::arg("NE")),
+          "Adds a contact by its matrices: inequalities A lambda <= 0, (m, n); weights > 0 of the\n"
+          "cost, (n,); NE, (6, n), takes lambda to the wrench about the centre of mass.\n"
+          "ValueError if the sizes do not fit, A is not finite or a weight not > 0.")
+      .def(
+          "solve", &solve, (bp::arg("self"), bp::arg("wrench"), bp::arg("minimalScale") = 0.),
+          "Solves for the forces that give a wrench, (6,): force [N], moment [N·m] about the\n"
+          "centre of mass, world axes, or the closest to it. Tolerances are relative to its norm,\n"
+          "but at least to minimalScale [N]. Returns the DistributionStatus.")
+      .def("result", &WrenchDistribution::result, bp::arg("self"), Copied(),
+           "The last solve()'s DistributionResult, a copy.")
+      .def("forgetForces", &WrenchDistribution::forgetForces, bp::arg("self"),
+           "Forgets the forces that a solve() without an answer would keep: until there is one\n"
+           "again, they are zero.")
+      .def("computeMargin", &WrenchDistribution::computeMargin, bp::arg("self"),
+           "How far the last solve()'s wrench is from what the contacts cannot give: a\n"
+           "WrenchMargin. Up to twelve small problems, too much for a control loop.")
       .def(CopyVisitor<WrenchDistribution>());
 }
 

@@ -36,14 +36,27 @@ CentroidalWrench computeGroundWrench(const CentroidalState& state, const Eigen::
           state.amVariation - extWrench.tail<3>()};                   // (2)
 }
 
+CentroidalState applyGroundWrench(const CentroidalState& state,
+                                  const CentroidalWrench& groundWrench,
+                                  const Eigen::Vector3d& gravity,
+                                  const Eigen::Matrix<double, 6, 1>& extWrench) {
+  CentroidalState applied = state;
+  applied.acom = (groundWrench.force + extWrench.head<3>()) / state.mass + gravity;  // (1)
+  applied.amVariation = groundWrench.torque + extWrench.tail<3>();                   // (2)
+  return applied;
+}
+
 Eigen::Vector2d computeFlatGroundCoP(const CentroidalWrench& groundWrench,
-                                     const Eigen::Vector3d& com, double groundHeight) {
+                                     const Eigen::Vector3d& com, double groundHeight,
+                                     double minimalVerticalForce) {
   const Eigen::Vector3d& f = groundWrench.force;
   const Eigen::Vector3d& tau = groundWrench.torque;
-  if (!(f.z() >= kMinimalVerticalForce))
-    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   const Eigen::Vector2d s_tau(-tau.y(), tau.x());
-  return com.head<2>() + (s_tau - f.head<2>() * (com.z() - groundHeight)) / f.z();  // (5)
+  const Eigen::Vector2d cop =
+      com.head<2>() + (s_tau - f.head<2>() * (com.z() - groundHeight)) / f.z();  // (5)
+  if (!(f.z() >= minimalVerticalForce) || !cop.allFinite())
+    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  return cop;
 }
 
 Eigen::Vector2d computeVRP(const CentroidalState& state, double omega) {

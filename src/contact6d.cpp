@@ -48,6 +48,21 @@ void Contact6D::initialize(const Contact6DSettings& settings) {
 
 std::shared_ptr<ContactBase> Contact6D::clone() const { return std::make_shared<Contact6D>(*this); }
 
+double Contact6D::getFrictionUsage() const {
+  if (cols() == 0) return ContactBase::getFrictionUsage();
+  return getUsage(appliedForce().head<2>().lpNorm<Eigen::Infinity>(), settings_.mu);
+}
+
+double Contact6D::getCoPMargin() const {
+  const Eigen::Vector2d half_sizes(settings_.half_length, settings_.half_width);
+  return (half_sizes - getCoP().cwiseAbs()).minCoeff<Eigen::PropagateNaN>();
+}
+
+double Contact6D::getYawUsage() const {
+  if (cols() == 0) return ContactBase::getYawUsage();
+  return getUsage(std::abs(appliedForce()[5]), settings_.gu);
+}
+
 void Contact6D::setMu(double mu) { change(&Contact6DSettings::mu, mu); }
 
 void Contact6D::setGu(double gu) { change(&Contact6DSettings::gu, gu); }

@@ -5,6 +5,12 @@
 
 namespace dynacom {
 
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
 void ContactBase::updateNewtonEuler(const Eigen::Vector3d& com, const SE3& oMs) {
   pose_ = oMs;
   if (cols() == 0) return;
@@ -30,10 +36,20 @@ ContactBase::Vector6 ContactBase::toWorldForces() const {
 }
 
 Eigen::Vector2d ContactBase::getCoP() const {
-  if (cols() == 0 || !(force_[2] > 0.))
-    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  if (cols() == 0 || !(force_[2] > 0.)) return Eigen::Vector2d::Constant(kNaN);
   if (cols() == 3) return Eigen::Vector2d::Zero();
   return Eigen::Vector2d(-force_[4], force_[3]) / force_[2];
+}
+
+double ContactBase::getFrictionUsage() const { return kNaN; }
+double ContactBase::getCoPMargin() const { return kNaN; }
+double ContactBase::getYawUsage() const { return kNaN; }
+
+double ContactBase::getUsage(double tangential, double coefficient) const {
+  if (force_.isZero(0.)) return 0.;
+  if (!(coefficient > 0.)) return kNaN;
+  if (!(force_[2] > 0.)) return std::numeric_limits<double>::infinity();
+  return tangential / (coefficient * force_[2]);
 }
 
 void ContactBase::reset(Eigen::Index uni_rows, Eigen::Index fri_rows, Eigen::Index cols) {

@@ -53,6 +53,11 @@ ContactBase::SE3 ContactPoint::getSurfacePose() const {
   return surface;
 }
 
+double ContactPoint::getFrictionUsage() const {
+  if (cols() == 0) return ContactBase::getFrictionUsage();
+  return getUsage(appliedForce().head<2>().lpNorm<Eigen::Infinity>(), settings_.mu);
+}
+
 void ContactPoint::setMu(double mu) { change(&ContactPointSettings::mu, mu); }
 
 void ContactPoint::setForceWeights(const Eigen::Vector3d& force_weights) {

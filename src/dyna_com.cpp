@@ -34,6 +34,16 @@ pinocchio::FrameIndex findFrame(const pinocchio::Model& model, const std::string
   return static_cast<pinocchio::FrameIndex>(frame - model.frames.begin());
 }
 
+CentroidalState unknownState(double mass) {
+  const Eigen::Vector3d nan = Eigen::Vector3d::Constant(kNaN);
+  return {mass, nan, nan, nan, nan, nan};
+}
+
+bool isFinite(const CentroidalState& state) {
+  return state.com.allFinite() && state.vcom.allFinite() && state.acom.allFinite() &&
+         state.am.allFinite() && state.amVariation.allFinite();
+}
+
 }  // namespace
 
 void DynaCoMSettings::validate() const {
@@ -95,11 +105,15 @@ void DynaCoM::setModel(pinocchio::Model&& model, DynaCoMSettings&& settings) {
 // Sets all numbers of the motion to NaN, as before the first computeDynamics().
 void DynaCoM::forgetMotion() {
   const Eigen::Vector3d nan = Eigen::Vector3d::Constant(kNaN);
-  state_ = {kNaN, nan, nan, nan, nan, nan};
+  state_ = unknownState(kNaN);
   ground_wrench_ = {nan, nan};
+  ext_wrench_.setConstant(kNaN);
+  feasible_ = state_;
+  distributed_by_dynamics_ = false;
   cop_ = vrp_ = nl_ = nan.head<2>();
-  ne_b_.setConstant(kNaN);
-  status_ = DistributionStatus::NoContact;
+  WrenchDistribution unsolved;
+  unsolved.setWrenchWeights(getWrenchWeights());
+  distribution_ = std::move(unsolved);
 }
 
 void DynaCoM::requireInitialized() const {
@@ -113,26 +127,44 @@ void DynaCoM::setGroundHeight(double groundHeight) {
   ground_height_ = groundHeight;
 }
 
+void DynaCoM::setMinimalVerticalForce(double minimalVerticalForce) {
+  if (!std::isfinite(minimalVerticalForce) || !(minimalVerticalForce > 0.))
+    throwInvalid("minimalVerticalForce must be finite and > 0 N, got ", minimalVerticalForce);
+  minimal_vertical_force_ = minimalVerticalForce;
+}
+
 void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
                               const Vector6& extWrench, bool flatHorizontalGround) {
   requireInitialized();
   updateFrames();
   state_ = computeCentroidalState(model_, data_, q, v, a);
-  ground_wrench_ = computeGroundWrench(state_, settings_.gravity, extWrench);
+  ext_wrench_ = extWrench;
+  if (!q.allFinite() || !v.allFinite() || !a.allFinite() || !extWrench.allFinite() ||
+      !isFinite(state_)) {
+    // There is a motion, of which nothing is known: not even what happens to be finite.
+    state_ = unknownState(mass_);
+    vrp_ = nl_ = Eigen::Vector2d::Constant(kNaN);
+    ext_wrench_.setConstant(kNaN);
+  }
+  ground_wrench_ = computeGroundWrench(state_, settings_.gravity, ext_wrench_);
   for (const Entry& entry : contacts_) place(*entry.contact, state_.com);
 
+  feasible_ = unknownState(mass_);
+  distributed_by_dynamics_ = !flatHorizontalGround;
   if (flatHorizontalGround) {
-    cop_ = computeFlatGroundCoP(ground_wrench_, state_.com, ground_height_);
+    cop_ =
+        computeFlatGroundCoP(ground_wrench_, state_.com, ground_height_, minimal_vertical_force_);
   } else {
     distributeForce(ground_wrench_.force, ground_wrench_.torque, state_.com);
-    cop_ = computePressureCentre();
+    cop_ = isFinite(state_) ? computePressureCentre()
+                            : Eigen::Vector2d(Eigen::Vector2d::Constant(kNaN));
   }
 }
 
 void DynaCoM::computeNL(double omega) {
   requireInitialized();
   if (!hasMotion()) throw NotReadyError("DynaCoM::computeNL needs computeDynamics() before");
-  vrp_ = computeVRP(state_, omega);
+  vrp_ = computeVRP(distributed_by_dynamics_ ? feasible_ : state_, omega);
   nl_ = cop_ - vrp_;  // (8)
 }
 
@@ -167,6 +199,7 @@ void DynaCoM::removeContact(const std::string& name) {
   const auto entry = find(name);
   entry->contact->deactivate();
   contacts_.erase(entry);
+  distribution_.forgetForces();
 }
 
 void DynaCoM::activateContact(const std::string& name) {
@@ -176,6 +209,7 @@ void DynaCoM::activateContact(const std::string& name) {
   if (hasMotion()) place(*entry->contact, state_.com);
   const auto end_of_active = firstInactive();
   entry->active = true;
+  distribution_.forgetForces();
   std::rotate(end_of_active, entry, entry + 1);
 }
 
@@ -184,6 +218,7 @@ void DynaCoM::deactivateContact(const std::string& name) {
   if (!entry->active) return;
   const auto end_of_active = firstInactive();
   entry->active = false;
+  distribution_.forgetForces();
   entry->contact->deactivate();
   std::rotate(entry, entry + 1, end_of_active);
 }
@@ -211,9 +246,11 @@ std::vector<DynaCoM::Entry>::iterator DynaCoM::firstInactive() {
 // Looks up the frames of contacts that were initialised again, which have forgotten theirs. Refuses
 // those that cannot be placed, before anything else changes.
 void DynaCoM::updateFrames() {
-  for (const Entry& entry : contacts_)
-    if (entry.contact->getFrameID() >= model_.frames.size())
-      entry.contact->setFrameID(findFrame(model_, entry.contact->getFrameName(), entry.name));
+  for (const Entry& entry : contacts_) {
+    if (entry.contact->getFrameID() < model_.frames.size()) continue;
+    entry.contact->setFrameID(findFrame(model_, entry.contact->getFrameName(), entry.name));
+    distribution_.forgetForces();
+  }
 }
 
 // Places a contact where its frame is. By oMi, which every kinematic algorithm of Pinocchio leaves
@@ -254,17 +291,45 @@ DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForc
     place(*entry.contact, com);
     distribution_.add(*entry.contact);
   }
-  ne_b_ << groundCoMForce, groundCoMTorque;
-  status_ = distribution_.solve(ne_b_, mass_ * kStandardGravity);
+  Vector6 wrench;
+  wrench << groundCoMForce, groundCoMTorque;
+  distribution_.solve(wrench, mass_ * kStandardGravity);
 
-  Eigen::Index col = 0;
-  for (const Entry& entry : contacts_) {
-    if (!entry.active) break;
-    const Eigen::Index cols = entry.contact->cols();
-    entry.contact->applyForce(distribution_.forces().segment(col, cols));
-    col += cols;
-  }
-  return status_;
+  const DistributionResult& result = distribution_.result();
+  for (std::size_t k = 0; k < result.contacts.size(); ++k)
+    contacts_[k].contact->applyForce(result.contacts[k].force);
+  if (hasMotion())
+    feasible_ = applyGroundWrench(state_, {result.achieved.head<3>(), result.achieved.tail<3>()},
+                                  settings_.gravity, ext_wrench_);
+  return result.status;
+}
+
+bool DynaCoM::isLoaded(const ContactBase& contact) const {
+  return contact.appliedForce()[2] >= minimal_vertical_force_;
+}
+
+Eigen::Vector2d DynaCoM::getContactCoP(const std::string& name) const {
+  const ContactBase& contact = *getContact(name);
+  return isLoaded(contact) ? contact.getCoP() : Eigen::Vector2d::Constant(kNaN);
+}
+
+double DynaCoM::getUsage(const std::string& name, double (ContactBase::*usage)() const) const {
+  const ContactBase& contact = *getContact(name);
+  const double value = (contact.*usage)();
+  return std::isnan(value) || isLoaded(contact) ? value : 0.;
+}
+
+double DynaCoM::getContactFrictionUsage(const std::string& name) const {
+  return getUsage(name, &ContactBase::getFrictionUsage);
+}
+
+double DynaCoM::getContactCoPMargin(const std::string& name) const {
+  const ContactBase& contact = *getContact(name);
+  return isLoaded(contact) ? contact.getCoPMargin() : kNaN;
+}
+
+double DynaCoM::getContactYawUsage(const std::string& name) const {
+  return getUsage(name, &ContactBase::getYawUsage);
 }
 
 // Equation (6), with each contact's own centre of pressure p_k in the world: S (p × F ẑ) = F p, so
@@ -281,7 +346,7 @@ Eigen::Vector2d DynaCoM::computePressureCentre() const {
     moment += force * surface.act(Eigen::Vector3d(cop.x(), cop.y(), 0.)).head<2>();
     vertical_force += force;
   }
-  if (!(vertical_force >= kMinimalVerticalForce)) return Eigen::Vector2d::Constant(kNaN);
+  if (!(vertical_force >= minimal_vertical_force_)) return Eigen::Vector2d::Constant(kNaN);
   return moment / vertical_force;
 }
 

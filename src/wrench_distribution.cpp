@@ -35,7 +35,7 @@ constexpr double kDependent = 1e-10;
 // Where the relaxation multiplies an inequality by less than this part of the distance, or by less
 // than this, it is rounding.
 constexpr double kMultiplied = 1e-10;
-constexpr double kMultiplierRounding = 1e-15;
+constexpr double kMultiplierRounding = 3e-12;
 // Of the relaxation: its √δ, how many steps it may take, when it has arrived, and what does not
 // approach an inequality.
 constexpr double kProximity = 1e-4;
@@ -186,7 +186,7 @@ struct WrenchDistribution::Workspace {
   Vector6 giveScaled(const Eigen::VectorXd& forces) const;
   void restrictToFace();
   DistributionStatus distribute(const Vector6& wrench);
-  bool passesCheck(const Vector6& wrench) const;
+  bool passesCheck(const Vector6& wrench, double inequality) const;
   Vector6 give(const Eigen::VectorXd& forces) const;
   void takeAnswer();
   void keepAnswer();
@@ -215,13 +215,7 @@ const Vector6& WrenchDistribution::getWrenchWeights() const { return work_->resu
 
 void WrenchDistribution::clear() { work_->added = 0; }
 
-void WrenchDistribution::reset() {
-  DistributionResult unsolved;
-  unsolved.wrench_weights = getWrenchWeights();
-  work_->result = unsolved;
-  work_->added = 0;
-  work_->has_answer = false;
-}
+void WrenchDistribution::forgetForces() { work_->has_answer = false; }
 
 const DistributionResult& WrenchDistribution::result() const { return work_->result; }
 
@@ -345,7 +339,7 @@ bool WrenchDistribution::Workspace::minimizeCost(const Vector6& wrench) {
   iterations += direct.solver.iterations();
   lambda = direct.solver.x().cwiseQuotient(direct.scales);
   // The solver leaves out equalities that depend on others, whether they contradict or not.
-  return status == MinimumNorm::Status::Solved && passesCheck(wrench);
+  return status == MinimumNorm::Status::Solved && passesCheck(wrench, 2. * kTolerance);
 }
 
 // Does the same on the face of relax(), where equalities and inequalities may all but depend on
@@ -376,7 +370,7 @@ bool WrenchDistribution::Workspace::minimizeCostOnFace(const Vector6& wrench) {
     // What shrinks slowly and evenly is the beginning of a geometric series.
     asked += missing / (ratio > 0.5 ? std::max(1. - ratio, kLeastShrinking) : 1.);
   }
-  return passesCheck(wrench);
+  return passesCheck(wrench, kAccurateInequality);
 }
 
 // Finds the reachable wrench slackened to a target, which is weighted by D and over the scale, by
@@ -511,14 +505,14 @@ DistributionStatus WrenchDistribution::Workspace::distribute(const Vector6& wren
   return relaxed ? DistributionStatus::Relaxed : DistributionStatus::Solved;
 }
 
-bool WrenchDistribution::Workspace::passesCheck(const Vector6& wrench) const {
+bool WrenchDistribution::Workspace::passesCheck(const Vector6& wrench, double inequality) const {
   if (!(weighted(result.wrench_weights, give(lambda) - wrench).norm() <= kAccurateWrench))
     return false;
   Eigen::Index col = 0;
   for (const Contact& contact : result.contacts) {
     const Eigen::Index cols = contact.A.cols();
     for (Eigen::Index j = 0; j < contact.A.rows(); ++j)
-      if (!(contact.A.row(j).dot(lambda.segment(col, cols)) <= kAccurateInequality)) return false;
+      if (!(contact.A.row(j).dot(lambda.segment(col, cols)) <= inequality)) return false;
     col += cols;
   }
   return true;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "problem_checker.hpp"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -13,6 +14,7 @@ using R3 = Eigen::Matrix<Real, 3, 1>;
 using R6 = Eigen::Matrix<Real, 6, 1>;
 using RX = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
 using dynacom::DistributionStatus;
+using Eigen::Index;
 
 R6 wrenchOf(const ProblemContact& contact, const RX& force) {
   const Eigen::Matrix<Real, 3, 3> rotation = contact.rotation.cast<Real>();
@@ -53,6 +55,28 @@ Real violation(const ProblemContact& contact, const RX& force) {
                         std::abs(force[4]) - contact.half_length * normal,
                         std::abs(force[5]) - contact.gu * normal});
   return largest;
+}
+
+/// y with NEᵀ y = Aᵀ μ', by least squares, from what the result says of the relaxation.
+R6 findNormal(const Problem& problem, const dynacom::DistributionResult& result) {
+  std::vector<RX> pulls;
+  Index size = 0;
+  for (const auto& contact : result.contacts) {
+    pulls.push_back(contact.A.cast<Real>().transpose() *
+                    contact.relaxation_multipliers.cast<Real>());
+    size += pulls.back().size();
+  }
+  Eigen::Matrix<Real, Eigen::Dynamic, 6> matrix(size, 6);
+  RX all_pulls(size);
+  Index row = 0;
+  for (std::size_t k = 0; k < pulls.size(); ++k) {
+    const Index rows = pulls[k].size();
+    for (int i = 0; i < 6; ++i)
+      matrix.col(i).segment(row, rows) = pullBack(problem.contacts[k], R6::Unit(i));
+    all_pulls.segment(row, rows) = pulls[k];
+    row += rows;
+  }
+  return matrix.completeOrthogonalDecomposition().solve(all_pulls);
 }
 
 }  // namespace
@@ -127,18 +151,21 @@ Verdict check(const Problem& problem, const dynacom::DistributionResult& result)
 
   // Any forces κ that give the same wrench cost at least cost(λ) + W² λ·(κ − λ), which is
   // cost(λ) − Σ g·κ + Σ g·λ with g = NEᵀ ν − W² λ for every ν, and g·κ ≤ support κ_z. Where the
-  // wrench is on the boundary, ν may be moved along y, which all such forces are orthogonal to.
+  // wrench is on the boundary, ν may be moved along y, which all such forces are orthogonal
+  // to; that is more accurate by the relaxation's multipliers than by what is left of the wrench.
   const R6 nu = result.wrench_multipliers.cast<Real>();
-  const Real nu_norm = nu.cwiseQuotient(weights).norm(), y_norm = y.cwiseQuotient(weights).norm();
+  const R6 normal_to_face = findNormal(problem, result);
+  const Real nu_norm = nu.cwiseQuotient(weights).norm();
+  const Real normal_norm = normal_to_face.cwiseQuotient(weights).norm();
   // Forces are as good as their digits: 1e-9 of the scale is nothing.
   const Real nothing = 1e-9 * scale * largest_weight;
   const Real cost_scale = cost + nothing * nothing;
   Real certain = std::numeric_limits<Real>::infinity(), nearby = certain;
-  const bool out_of_reach = distance > 1e-13 * scale;
-  for (int power = -7; power <= (out_of_reach ? 24 : -7); ++power) {
+  const bool on_face = normal_norm > 0.;
+  for (int power = -7; power <= (on_face ? 24 : -7); ++power) {
     const Real along =
-        power > -7 ? std::pow(Real(10), Real(power) / 2) * nu_norm / y_norm : Real(0);
-    const R6 multiplier = nu + along * y;
+        power > -7 ? std::pow(Real(10), Real(power) / 2) * nu_norm / normal_norm : Real(0);
+    const R6 multiplier = nu + along * normal_to_face;
     Real gap = 0.;
     for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
       const ProblemContact& contact = problem.contacts[k];
@@ -150,7 +177,7 @@ Verdict check(const Problem& problem, const dynacom::DistributionResult& result)
     }
     certain = std::min(certain, gap / cost_scale);
     // The same for a wrench that differs by 1e-12 of the scale along y.
-    const Real other = along * y_norm * 1e-12 * scale / cost_scale;
+    const Real other = along * normal_norm * 1e-12 * scale / cost_scale;
     if (other <= 1e-2) nearby = std::min(nearby, gap / cost_scale - other);
   }
   verdict.cost_gap = static_cast<double>(certain);

@@ -22,8 +22,8 @@ struct Verdict {
 };
 
 /// Certifies forces by weak duality. Each contact's cone is spanned by its corners, so that the
-/// largest value of a linear function over it is known in closed form: no inequality matrices, no
-/// multipliers of them, no active set are looked at, and all is computed in extended precision.
+/// largest value of a linear function over it is known in closed form, and all is computed in
+/// extended precision. What the result says of multipliers is but a hint at which bounds to try.
 Verdict check(const Problem& problem, const dynacom::DistributionResult& result);
 
 }  // namespace dynacom_tests

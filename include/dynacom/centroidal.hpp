@@ -50,7 +50,16 @@ DYNACOM_EXPORT CentroidalWrench computeGroundWrench(
     const CentroidalState& state, const Eigen::Vector3d& gravity,
     const Eigen::Matrix<double, 6, 1>& extWrench = Eigen::Matrix<double, 6, 1>::Zero());
 
-/// Below this vertical force a centre of pressure means nothing [N].
+/// The inverse of computeGroundWrench(): the state, with the accelerations that a ground wrench
+/// causes,
+///
+///     c̈ = (f + f_e)/m + g      L̇ = τ + τ_e
+DYNACOM_EXPORT CentroidalState applyGroundWrench(
+    const CentroidalState& state, const CentroidalWrench& groundWrench,
+    const Eigen::Vector3d& gravity,
+    const Eigen::Matrix<double, 6, 1>& extWrench = Eigen::Matrix<double, 6, 1>::Zero());
+
+/// Below this vertical force a centre of pressure means nothing, unless one says otherwise [N].
 constexpr double kMinimalVerticalForce = 1.;
 
 /// Centre of pressure of a ground wrench on flat horizontal ground, equation (5),
@@ -60,10 +69,11 @@ constexpr double kMinimalVerticalForce = 1.;
 /// of which x and y are meant.
 /// @param com           c, world [m]
 /// @param groundHeight  h, world [m]
-/// @return p, world [m]; NaN where f_z is below kMinimalVerticalForce
-DYNACOM_EXPORT Eigen::Vector2d computeFlatGroundCoP(const CentroidalWrench& groundWrench,
-                                                    const Eigen::Vector3d& com,
-                                                    double groundHeight = 0.);
+/// @param minimalVerticalForce  what f_z must have at least, > 0 [N]
+/// @return p, world [m]; NaN where f_z is below that, or p is beyond the largest numbers
+DYNACOM_EXPORT Eigen::Vector2d computeFlatGroundCoP(
+    const CentroidalWrench& groundWrench, const Eigen::Vector3d& com, double groundHeight = 0.,
+    double minimalVerticalForce = kMinimalVerticalForce);
 
 /// Virtual repellent point on the ground's plane, equation (7): v = c − c̈ / ω² [m].
 /// @param omega  ω > 0, natural frequency of the linear inverted pendulum [rad/s]

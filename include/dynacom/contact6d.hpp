@@ -59,6 +59,9 @@ class DYNACOM_EXPORT Contact6D : public ContactBase {
   std::shared_ptr<ContactBase> clone() const override;
   const Contact6DSettings& getSettings() const { return settings_; }
   const std::string& getFrameName() const override { return settings_.frame_name; }
+  double getFrictionUsage() const override;
+  double getCoPMargin() const override;
+  double getYawUsage() const override;
 
   /// Each throws std::invalid_argument where the value is out of the range that Contact6DSettings
   /// gives, and NotReadyError before initialize(); the matrices follow at once.

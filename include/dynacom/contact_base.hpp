@@ -109,10 +109,25 @@ class DYNACOM_EXPORT ContactBase {
   /// the normal force is positive.
   Eigen::Vector2d getCoP() const;
 
+  /// How much of the friction that the applied force allows it uses: the larger of |f_x| and |f_y|
+  /// over μ f_z, 1 on the pyramid. 0 where there is no force; infinite where there is one without a
+  /// positive normal force; NaN where there is no friction to use (μ = 0), and for kinds that know
+  /// of none.
+  virtual double getFrictionUsage() const;
+  /// Distance of getCoP() to the nearest edge of the surface, negative beyond it [m]; NaN unless
+  /// the normal force is positive, and for kinds without edges.
+  virtual double getCoPMargin() const;
+  /// The same as getFrictionUsage() for the yaw moment: |τ_z| over γ f_z.
+  virtual double getYawUsage() const;
+
  protected:
   ContactBase() = default;
   ContactBase(const ContactBase&) = default;
   ContactBase& operator=(const ContactBase&) = default;
+
+  /// The larger of some components' magnitudes over a limit per normal force, as
+  /// getFrictionUsage().
+  double getUsage(double tangential, double coefficient) const;
 
   /// Gives the matrices their sizes, forgets frame index and force. For initialize().
   void reset(Eigen::Index uni_rows, Eigen::Index fri_rows, Eigen::Index cols);

@@ -54,6 +54,7 @@ class DYNACOM_EXPORT ContactPoint : public ContactBase {
   std::shared_ptr<ContactBase> clone() const override;
   const ContactPointSettings& getSettings() const { return settings_; }
   const std::string& getFrameName() const override { return settings_.frame_name; }
+  double getFrictionUsage() const override;
   SE3 getSurfacePose() const override;
 
   /// @throws std::invalid_argument unless mu ≥ 0; NotReadyError before initialize()

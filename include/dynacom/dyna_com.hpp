@@ -83,17 +83,30 @@ class DYNACOM_EXPORT DynaCoM {
   /// @throws std::invalid_argument unless groundHeight is finite
   void setGroundHeight(double groundHeight);
 
+  /// Below this vertical force a centre of pressure means nothing, kMinimalVerticalForce by default
+  /// [N]: getCoP() is NaN then, and for a contact, below this normal force, getContactCoP().
+  double getMinimalVerticalForce() const { return minimal_vertical_force_; }
+  /// @throws std::invalid_argument unless minimalVerticalForce is finite and > 0
+  void setMinimalVerticalForce(double minimalVerticalForce);
+
+  /// Weights of the norm in which a wrench that is out of reach is replaced by the closest that the
+  /// contacts can give, see WrenchDistribution::setWrenchWeights().
+  const Vector6& getWrenchWeights() const { return distribution_.getWrenchWeights(); }
+  /// @throws std::invalid_argument unless all are finite and > 0
+  void setWrenchWeights(const Vector6& weights) { distribution_.setWrenchWeights(weights); }
+
   /// Computes the centroidal state, the ground wrench by equations (1, 2), the placement of all
   /// known contacts, and the centre of pressure. On flat horizontal ground that is equation (5).
-  /// Elsewhere the wrench is first distributed, see distributeForce(), and equation (6) gives the
-  /// centre of the vertical pressures,
+  /// Elsewhere the wrench is first distributed, see distributeForce(), and from what the contacts
+  /// achieve of it equation (6) gives the centre of the vertical pressures,
   ///
   ///     p = S τᵒ / f_z,   τᵒ = Σ p_k × (f_k·ẑ) ẑ,   f_z = Σ f_k·ẑ
   ///
   /// with p_k the centre of pressure of contact k and f_k its force. Contacts without load drop
   /// out.
   /// @param extWrench  (force [N], moment [N·m]) on the robot besides the contacts', about the CoM
-  /// Numbers that are not finite make the results that depend on them NaN or infinite.
+  /// If a number is not finite, or becomes so, all results are NaN, and the distribution, if there
+  /// is one, ends as DistributionStatus::InvalidInput.
   /// @throws std::invalid_argument if a vector has the wrong size; NotReadyError before
   ///         initialize()
   void computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
@@ -110,12 +123,26 @@ class DYNACOM_EXPORT DynaCoM {
   /// Of the last computeDynamics(): angular momentum about the CoM, and its rate.
   const Eigen::Vector3d& getAM() const { return state_.am; }                    ///< [kg·m²/s]
   const Eigen::Vector3d& getAMVariation() const { return state_.amVariation; }  ///< [N·m]
-  /// Of the last computeDynamics(): centre of pressure [m]. NaN where the vertical force is below
-  /// kMinimalVerticalForce, or, when the ground is not flat, the wrench was not distributed.
+  /// Of the last computeDynamics(): centre of pressure [m]; NaN unless isCoPDefined().
   const Eigen::Vector2d& getCoP() const { return cop_; }
+  /// Whether there is a centre of pressure: the vertical force is getMinimalVerticalForce() or
+  /// more.
+  bool isCoPDefined() const { return cop_.allFinite(); }
+
+  /// The accelerations that the contacts can really cause, by the wrench (f, τ) that the last
+  /// distribution since computeDynamics() has achieved and that call's extWrench (f_e, τ_e),
+  ///
+  ///     c̈ = (f + f_e)/m + g      L̇ = τ + τ_e
+  ///
+  /// which are those of the motion if the distribution is DistributionStatus::Solved. NaN before.
+  const Eigen::Vector3d& getFeasibleACoM() const { return feasible_.acom; }  ///< [m/s²]
+  const Eigen::Vector3d& getFeasibleAMVariation() const {                    ///< [N·m]
+    return feasible_.amVariation;
+  }
 
   /// Computes the virtual repellent point v = c − c̈/ω² and the non-linearity n = p − v, equations
-  /// (7, 8), of the last computeDynamics().
+  /// (7, 8), of the last computeDynamics(). Where that has distributed the wrench, because the
+  /// ground is not flat, c̈ is getFeasibleACoM(), so that p and v are those of one motion.
   /// @param omega  ω > 0 [rad/s]
   /// @throws std::invalid_argument unless ω > 0; NotReadyError before computeDynamics()
   void computeNL(double omega);
@@ -125,7 +152,7 @@ class DYNACOM_EXPORT DynaCoM {
                  const Vector6& extWrench = Vector6::Zero(), bool flatHorizontalGround = true);
 
   const Eigen::Vector2d& getVRP() const { return vrp_; }  ///< Of the last computeNL() [m].
-  const Eigen::Vector2d& getNL() const { return nl_; }    ///< The same; NaN where the CoP is.
+  const Eigen::Vector2d& getNL() const { return nl_; }    ///< The same; NaN where the CoP is [m].
 
   /// Makes a contact known under a name, and active unless said otherwise. It is shared, not
   /// copied: settings that change in the caller's hand act on the next call. A contact serves one
@@ -159,17 +186,36 @@ class DYNACOM_EXPORT DynaCoM {
   std::vector<std::string> getKnownContacts() const;
 
   /// Shares a wrench between the active contacts, placed by getData(): the cheapest forces that
-  /// give it within all inequalities, equations (9–13). Each contact is given its force; unless
-  /// the status is DistributionStatus::Solved, that is zero.
+  /// give it within all inequalities, equations (9–13), or the closest wrench that they can give.
+  /// Each contact is given its force. What it all amounts to is in getDistribution().
+  ///
+  /// DistributionStatus says which case it was. Where there is no answer (InvalidInput,
+  /// NumericalFailure), forces are those of the last one, unless contacts were added, removed,
+  /// activated, deactivated or given other settings since: then they are zero.
   /// @param groundCoMForce   [N]
   /// @param groundCoMTorque  about the CoM [N·m]
   /// @param com              position of the CoM [m]
   DistributionStatus distributeForce(const Eigen::Vector3d& groundCoMForce,
                                      const Eigen::Vector3d& groundCoMTorque,
                                      const Eigen::Vector3d& com);
-  /// How the last distribution ended, be it distributeForce()'s or computeDynamics()'s own;
-  /// DistributionStatus::NoContact before the first.
-  DistributionStatus getDistributionStatus() const { return status_; }
+  /// The last distribution, be it distributeForce()'s or computeDynamics()'s own; its contacts are
+  /// those that were active then, in the order of their activation. As it was before the first
+  /// distribution once contacts are added, removed, activated or deactivated.
+  const DistributionResult& getDistribution() const { return distribution_.result(); }
+  /// Its status: DistributionStatus::NoContact before the first.
+  DistributionStatus getDistributionStatus() const { return getDistribution().status; }
+  /// How far its wrench is from what the contacts cannot give. For a look, not for a control loop.
+  WrenchMargin computeWrenchMargin() { return distribution_.computeMargin(); }
+
+  /// Of the last distribution, for a contact: its centre of pressure, in its surface's plane [m];
+  /// NaN where its normal force is below getMinimalVerticalForce().
+  /// @throws std::invalid_argument if the name is not known, as the next three
+  Eigen::Vector2d getContactCoP(const std::string& name) const;
+  /// ContactBase::getFrictionUsage(), getCoPMargin() and getYawUsage(): 0, NaN [m] and 0 where the
+  /// normal force is below getMinimalVerticalForce().
+  double getContactFrictionUsage(const std::string& name) const;
+  double getContactCoPMargin(const std::string& name) const;
+  double getContactYawUsage(const std::string& name) const;
 
   /// Of the active contacts, stacked: block-diagonal U and C, their right-hand sides, the weights,
   /// and the matrix NE (6 rows), as the contacts hold them now.
@@ -180,8 +226,8 @@ class DYNACOM_EXPORT DynaCoM {
   Eigen::VectorXd reg_A() const;
   Eigen::VectorXd reg_b() const;
   Eigen::MatrixXd ne_A() const;
-  /// The wrench (force, moment) about the CoM that the last distributeForce() was asked for.
-  const Vector6& ne_b() const { return ne_b_; }
+  /// The wrench (force, moment) about the CoM that the last distribution was asked for.
+  const Vector6& ne_b() const { return getDistribution().wrench; }
   /// The forces of the active contacts, stacked, each in its surface's frame.
   Eigen::VectorXd allForces() const;
 
@@ -208,6 +254,8 @@ class DYNACOM_EXPORT DynaCoM {
   std::vector<Entry>::iterator firstInactive();
   void updateFrames();
   void place(ContactBase& contact, const Eigen::Vector3d& com);
+  bool isLoaded(const ContactBase& contact) const;
+  double getUsage(const std::string& name, double (ContactBase::*usage)() const) const;
   Eigen::Vector2d computePressureCentre() const;
   template <class Rows, class Block>
   Eigen::MatrixXd stackDiagonally(Rows rows, Block block) const;
@@ -219,15 +267,17 @@ class DYNACOM_EXPORT DynaCoM {
   pinocchio::Data data_;
   double mass_ = 0.;
   double ground_height_ = 0.;
+  double minimal_vertical_force_ = kMinimalVerticalForce;
 
   CentroidalState state_;
   CentroidalWrench ground_wrench_;
+  Vector6 ext_wrench_;
+  CentroidalState feasible_;  // the state with the accelerations that contacts can cause
+  bool distributed_by_dynamics_ = false;  // whether p and v are those of feasible_
   Eigen::Vector2d cop_, vrp_, nl_;
 
   std::vector<Entry> contacts_;  // the active ones first
   WrenchDistribution distribution_;
-  Vector6 ne_b_;
-  DistributionStatus status_;
 };
 
 }  // namespace dynacom

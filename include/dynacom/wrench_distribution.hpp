@@ -121,8 +121,8 @@ class DYNACOM_EXPORT WrenchDistribution {
   void setWrenchWeights(const Vector6& weights);
   const Vector6& getWrenchWeights() const;
 
-  /// Begins a new problem, without contacts. Forces that a solve() without an answer would keep are
-  /// not forgotten: they are compared with what is added next.
+  /// Begins a new problem, without contacts. If what is added next has the inequalities and weights
+  /// of before, a solve() without an answer keeps the forces of before.
   void clear();
 
   /// Adds a contact, with the matrices that it has now.
@@ -150,8 +150,9 @@ class DYNACOM_EXPORT WrenchDistribution {
   /// The last solve()'s answer. clear() and add() change its contacts, solve() makes it whole.
   const DistributionResult& result() const;
 
-  /// Forgets the answer: result() is as before the first solve(), without contacts.
-  void reset();
+  /// Forgets the forces that a solve() without an answer would keep: until there is one again, they
+  /// are zero. For contacts that are others than before, but have the same matrices.
+  void forgetForces();
 
   /// How far the last solve()'s wrench is from what the contacts cannot give: up to twelve small
   /// problems, too much for a control loop.
