@@ -50,7 +50,7 @@ constexpr int kMultiplierSteps = 30;
 constexpr double kMissing = 1e-11;
 constexpr double kLeastShrinking = 1e-5;
 // The margin's search has arrived when it is this close to what can be reached, or when a step
-// changes it by less than this part.
+// changes it by less than this part; below that it is zero.
 constexpr double kMarginReach = 1e-11;
 constexpr double kMarginChange = 1e-10;
 constexpr int kMarginSteps = 50;
@@ -115,7 +115,9 @@ bool DistributionResult::isOptimal(double tolerance) const {
     const Eigen::VectorXd of_wrench = contact.NE.transpose() * wrench_multipliers;
     const Eigen::VectorXd of_bounds = contact.A.transpose() * contact.multipliers;
     const double terms =
-        std::max({of_cost.lpNorm<Eigen::Infinity>(), of_wrench.lpNorm<Eigen::Infinity>(),
+        std::max({kNegligible * scale * contact.weights.cwiseAbs2().maxCoeff(),
+                  of_cost.lpNorm<Eigen::Infinity>(),
+                  (contact.NE.cwiseAbs().transpose() * wrench_multipliers.cwiseAbs()).maxCoeff(),
                   (contact.A.cwiseAbs().transpose() * contact.multipliers.cwiseAbs()).maxCoeff()});
     if (!((of_cost - of_wrench + of_bounds).lpNorm<Eigen::Infinity>() <= tolerance * terms))
       return false;
@@ -649,7 +651,7 @@ double WrenchDistribution::Workspace::findBoundary(const Vector6& wrench, const 
     if (distance.norm() <= kMarginReach) break;
     const double cut = std::max(0., -distance.dot(wrench) / distance.dot(direction));
     if (!(cut < s * (1. - kMarginChange))) break;
-    s = cut;
+    s = cut > kMarginChange ? cut : 0.;
   }
   return s;
 }
