@@ -9,9 +9,7 @@ namespace dynacom::internal {
 
 namespace {
 
-// A normal whose part outside the span of others is shorter than this depends on them: for
-// inequalities relative to its length.
-constexpr double kDependent = 1e-12;
+// An equality whose normal has no more than this outside the span of others follows from them.
 constexpr double kDependentEquality = 1e-10;
 // An inequality that depends on active ones contradicts them if it is violated by more than this
 // many tolerances, times what the tolerances of the active ones add up to in it.
@@ -26,22 +24,22 @@ int iterationLimit(Eigen::Index inequalities) { return 50 + 10 * static_cast<int
 MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& E,
                                        const Eigen::Ref<const Eigen::VectorXd>& d,
                                        const Eigen::Ref<const Eigen::MatrixXd>& G,
-                                       const Eigen::Ref<const Eigen::VectorXd>& h,
-                                       double tolerance) {
+                                       const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance,
+                                       double dependent) {
   iterations_ = 0;
   y_.resize(E.cols());
   z_.resize(G.cols());
   implied_.clear();
   implied_.reserve(G.cols());
   startWithEqualities(E, d);
-  const Status status = activateViolated(G, h, tolerance);
+  const Status status = activateViolated(G, h, tolerance, dependent);
   readMultipliers();
   return status;
 }
 
 MinimumNorm::Status MinimumNorm::activateViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
                                                   const Eigen::Ref<const Eigen::VectorXd>& h,
-                                                  double tolerance) {
+                                                  double tolerance, double dependent) {
   for (bool refined = true;;) {
     const Eigen::Index violated = findViolated(G, h, tolerance);
     if (violated < 0) {
@@ -64,7 +62,7 @@ MinimumNorm::Status MinimumNorm::activateViolated(const Eigen::Ref<const Eigen::
       const auto outside = Jn_.tail(Jn_.size() - q_);
       const double violation = G.col(violated).dot(x_) - h[violated];
       double whole = kInfinity;
-      if (outside.squaredNorm() > kDependent * kDependent * Jn_.squaredNorm())
+      if (outside.squaredNorm() > dependent * dependent * Jn_.squaredNorm())
         whole = violation / outside.squaredNorm();
       double partial = kInfinity;
       Eigen::Index leaving = -1;

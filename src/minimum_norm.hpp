@@ -27,10 +27,14 @@ class MinimumNorm {
   ///                   are zero, up to rounding
   /// @param G, h       inequalities, n × m and m
   /// @param tolerance  by how much Gᵀ x may exceed h
+  /// @param dependent  an inequality whose normal has no more than this part outside the span of
+  /// the
+  ///                   active ones follows from them or contradicts them
   Status solve(const Eigen::Ref<const Eigen::MatrixXd>& E,
                const Eigen::Ref<const Eigen::VectorXd>& d,
                const Eigen::Ref<const Eigen::MatrixXd>& G,
-               const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance);
+               const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance,
+               double dependent = 1e-12);
 
   /// The solution, n.
   const Eigen::VectorXd& x() const { return x_; }
@@ -47,7 +51,8 @@ class MinimumNorm {
                            const Eigen::Ref<const Eigen::VectorXd>& d);
   void completeBasis();
   Status activateViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
-                          const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance);
+                          const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance,
+                          double dependent);
   template <class Matrix>
   void applyQ(Matrix& matrix);
   Eigen::Index findViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,

@@ -23,6 +23,7 @@ using NewtonEuler = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
 // A wrench no farther than this from what the contacts can give is within reach.
 constexpr double kReach = 1e-8;
+constexpr double kNearlyDependent = 1e-8;
 // By how much the solver may leave an inequality behind.
 constexpr double kTolerance = 1e-12;
 // How far an answer may be from its inequalities and from its wrench.
@@ -39,14 +40,18 @@ constexpr double kMultiplierRounding = 3e-12;
 // Of the relaxation: its √δ, how many steps it may take, when it has arrived, and what does not
 // approach an inequality.
 constexpr double kProximity = 1e-4;
-constexpr int kProximalSteps = 30;
+constexpr double kLeastProximity = 1e-7;
+constexpr int kEasySteps = 2;
+constexpr int kProximalSteps = 100;
 constexpr double kProximalChange = 1e-11;
+constexpr double kProximalGain = 1e-13;
+constexpr int kStalledSteps = 2;
 constexpr double kProximalRounding = 1e-15;
 constexpr double kRounding = 1e-15;
 constexpr double kParallel = 1e-9;
 // Of the cheapest forces on a face: √ε, how many steps, and when nothing is missing any more.
 constexpr double kSlack = 1e-4;
-constexpr int kMultiplierSteps = 30;
+constexpr int kMultiplierSteps = 100;
 constexpr double kMissing = 1e-11;
 constexpr double kLeastShrinking = 1e-5;
 // The margin's search has arrived when it is this close to what can be reached, or when a step
@@ -133,7 +138,8 @@ bool DistributionResult::isOptimal(double tolerance) const {
     const Eigen::VectorXd of_pull = contact.NE.transpose() * pull;
     const Eigen::VectorXd of_relaxation = contact.A.transpose() * contact.relaxation_multipliers;
     if (!((of_pull - of_relaxation).lpNorm<Eigen::Infinity>() <=
-          tolerance * pull.lpNorm<Eigen::Infinity>() *
+          (tolerance * pull.lpNorm<Eigen::Infinity>() +
+           kTolerance * scale * wrench_weights.maxCoeff()) *
               std::max(1., contact.NE.lpNorm<Eigen::Infinity>())))
       return false;
   }
@@ -180,9 +186,9 @@ struct WrenchDistribution::Workspace {
   void count();
   void assemble(Program& program, const Vector6& row_weights, double slack);
   void assembleCheapest(Program& program, double slack);
-  void assembleClosest();
+  void assembleClosest(double proximity);
   bool minimizeCost(const Vector6& wrench);
-  bool minimizeCostOnFace(const Vector6& wrench);
+  bool minimizeCostOnFace(const Vector6& wrench, double tolerance);
   bool relax(const Vector6& target);
   void extrapolate();
   Vector6 giveScaled(const Eigen::VectorXd& forces) const;
@@ -319,7 +325,7 @@ void WrenchDistribution::Workspace::assembleCheapest(Program& program, double sl
 }
 
 // The scales are what a unit of λ does to the weighted wrench. See relax().
-void WrenchDistribution::Workspace::assembleClosest() {
+void WrenchDistribution::Workspace::assembleClosest(double proximity) {
   slackened.scales.resize(n);
   Eigen::Index col = 0;
   for (const Contact& contact : result.contacts)
@@ -327,7 +333,7 @@ void WrenchDistribution::Workspace::assembleClosest() {
       slackened.scales[col] = weighted(result.wrench_weights, contact.NE.col(i)).norm();
       if (slackened.scales[col] == 0.) slackened.scales[col] = 1.;
     }
-  assemble(slackened, result.wrench_weights, kProximity);
+  assemble(slackened, result.wrench_weights, proximity);
 }
 
 // Finds the cheapest forces that give a wrench, which is over the scale. False if there are none,
@@ -337,7 +343,7 @@ bool WrenchDistribution::Workspace::minimizeCost(const Vector6& wrench) {
   direct.d = wrench.cwiseQuotient(direct.norms);
   direct.h.setZero(m);
   const MinimumNorm::Status status =
-      direct.solver.solve(direct.E, direct.d, direct.G, direct.h, kTolerance);
+      direct.solver.solve(direct.E, direct.d, direct.G, direct.h, kTolerance, kNearlyDependent);
   iterations += direct.solver.iterations();
   lambda = direct.solver.x().cwiseQuotient(direct.scales);
   // The solver leaves out equalities that depend on others, whether they contradict or not.
@@ -351,15 +357,17 @@ bool WrenchDistribution::Workspace::minimizeCost(const Vector6& wrench) {
 //     minimise ½ ‖x‖² + ½ ‖s‖²   subject to   NE λ + √ε s = asked,   A λ ≤ 0
 //
 // again and again, until nothing is missing.
-bool WrenchDistribution::Workspace::minimizeCostOnFace(const Vector6& wrench) {
+bool WrenchDistribution::Workspace::minimizeCostOnFace(const Vector6& wrench, double tolerance) {
   assembleCheapest(slackened, kSlack);
   restrictToFace();
   slackened.h.setZero(m);
+  // The residual is to be accurate, too.
+  const double enough = std::min(kMissing, std::max(kMissing * 1e3 * distance.norm(), kRounding));
   Vector6 asked = wrench, missing = Vector6::Constant(std::numeric_limits<double>::infinity());
   for (int step = 0; step < kMultiplierSteps; ++step) {
     slackened.d = asked.cwiseQuotient(slackened.norms);
     const MinimumNorm::Status status =
-        slackened.solver.solve(slackened.E, slackened.d, slackened.G, slackened.h, kTolerance);
+        slackened.solver.solve(slackened.E, slackened.d, slackened.G, slackened.h, tolerance);
     iterations += slackened.solver.iterations();
     if (status != MinimumNorm::Status::Solved) return false;
     lambda.noalias() = face * slackened.solver.x().tail(n);
@@ -367,10 +375,11 @@ bool WrenchDistribution::Workspace::minimizeCostOnFace(const Vector6& wrench) {
     const Vector6 former = missing;
     missing = wrench - give(lambda);
     const double ratio = step > 0 ? missing.dot(former) / former.squaredNorm() : 0.;
-    if (missing.norm() <= kRounding || (missing.norm() <= kMissing && step > 0 && !(ratio < 0.5)))
+    if (missing.norm() <= kRounding || (missing.norm() <= enough && step > 0 && !(ratio < 0.5)))
       break;
+    if (ratio > 1. - kLeastShrinking && missing.norm() <= kAccurateWrench / 10.) break;
     // What shrinks slowly and evenly is the beginning of a geometric series.
-    asked += missing / (ratio > 0.5 ? std::max(1. - ratio, kLeastShrinking) : 1.);
+    asked += missing / std::max(1. - std::max(ratio, 0.), kLeastShrinking);
   }
   return passesCheck(wrench, kAccurateInequality);
 }
@@ -389,23 +398,33 @@ bool WrenchDistribution::Workspace::relax(const Vector6& target) {
   slackened.h.resize(m);
   scaled.setZero(n);
   distance = target;
-  assembleClosest();
+  double proximity = kProximity, former = std::numeric_limits<double>::infinity();
+  int stalled = 0;
+  assembleClosest(proximity);
   for (int step = 0; step < kProximalSteps; ++step) {
-    slackened.d = kProximity * (target - giveScaled(scaled)).cwiseQuotient(slackened.norms);
-    slackened.h.noalias() = -kProximity * (slackened.G.bottomRows(n).transpose() * scaled);
-    const double tolerance = std::max(kProximalRounding * distance.norm(), kProximity * kRounding);
+    slackened.d = proximity * (target - giveScaled(scaled)).cwiseQuotient(slackened.norms);
+    slackened.h.noalias() = -proximity * (slackened.G.bottomRows(n).transpose() * scaled);
+    const double tolerance = std::max(kProximalRounding * distance.norm(), proximity * kRounding);
     const MinimumNorm::Status status =
         solver.solve(slackened.E, slackened.d, slackened.G, slackened.h, tolerance);
     iterations += solver.iterations();
     if (status != MinimumNorm::Status::Solved) return false;
     distance = solver.x().head<6>();
-    change = solver.x().tail(n) / kProximity;
+    change = solver.x().tail(n) / proximity;
     scaled += change;
     if (change.norm() <= kProximalChange * (1. + scaled.norm())) break;
+    const bool closer = distance.norm() < (1. - kProximalGain) * former;
+    stalled = closer ? 0 : stalled + 1;
+    if (stalled == kStalledSteps) break;
+    former = distance.norm();
     extrapolate();
+    if (step >= kEasySteps && distance.norm() < proximity && proximity > kLeastProximity) {
+      proximity = std::max(distance.norm(), kLeastProximity);
+      assembleClosest(proximity);
+    }
   }
   lambda = scaled.cwiseQuotient(slackened.scales);
-  relaxation_multipliers = kProximity * solver.z();
+  relaxation_multipliers = proximity * solver.z();
   return true;
 }
 
@@ -502,14 +521,18 @@ DistributionStatus WrenchDistribution::Workspace::distribute(const Vector6& wren
   if (!relax(weighted(result.wrench_weights, wrench))) return DistributionStatus::NumericalFailure;
   const bool relaxed = distance.norm() > kReach;
   on_face = true;
-  if (!minimizeCostOnFace(wrench - distance.cwiseQuotient(result.wrench_weights)))
-    return DistributionStatus::NumericalFailure;
-  return relaxed ? DistributionStatus::Relaxed : DistributionStatus::Solved;
+  // Large forces that cancel out want a larger tolerance.
+  const Vector6 closest = wrench - distance.cwiseQuotient(result.wrench_weights);
+  for (const double tolerance : {kTolerance, 10. * kTolerance, 100. * kTolerance})
+    if (minimizeCostOnFace(closest, tolerance))
+      return relaxed ? DistributionStatus::Relaxed : DistributionStatus::Solved;
+  return DistributionStatus::NumericalFailure;
 }
 
 bool WrenchDistribution::Workspace::passesCheck(const Vector6& wrench, double inequality) const {
   if (!(weighted(result.wrench_weights, give(lambda) - wrench).norm() <= kAccurateWrench))
     return false;
+  inequality *= std::max(1., lambda.lpNorm<Eigen::Infinity>());
   Eigen::Index col = 0;
   for (const Contact& contact : result.contacts) {
     const Eigen::Index cols = contact.A.cols();

@@ -110,7 +110,7 @@ Verdict check(const Problem& problem, const dynacom::DistributionResult& result)
     largest_weight = std::max<Real>(largest_weight, contact.weights.maxCoeff());
     least_weight = std::min<Real>(least_weight, contact.weights.minCoeff());
   }
-  verdict.outside_cone = static_cast<double>(outside / scale);
+  verdict.outside_cone = static_cast<double>(outside / std::max(scale, all_normal));
   if (!(verdict.outside_cone <= 1e-9)) wrong("a force is outside its cone");
 
   const R6 residual = wrench - achieved;

@@ -12,7 +12,7 @@ namespace dynacom_tests {
 /// What an answer is certified to be. Over the scale, or over the largest number compared.
 struct Verdict {
   std::string error;         ///< what is wrong with it; empty if nothing
-  double outside_cone = 0.;  ///< by how much a force is outside its cone
+  double outside_cone = 0.;  ///< by how much a force is outside its cone, over scale or forces
   double residual = 0.;      ///< norm of the residual
   double residual_gap = 0.;  ///< by how much that could be above the least, at most
   double cost_gap = 0.;      ///< by which part of the cost that could be above the least, at most
