@@ -26,9 +26,12 @@ constexpr double kReach = 1e-8;
 constexpr double kNearlyDependent = 1e-8;
 // By how much the solver may leave an inequality behind.
 constexpr double kTolerance = 1e-12;
-// How far an answer may be from its inequalities and from its wrench.
+// How far an answer may be from its wrench and from its inequalities: at the first attempt, and
+// after the relaxation.
+constexpr double kExactWrench = 1e-9;
+constexpr double kExactInequality = 2e-12;
+constexpr double kAccurateWrench = 5e-9;
 constexpr double kAccurateInequality = 1e-10;
-constexpr double kAccurateWrench = 1e-9;
 // Forces below this are as good as none.
 constexpr double kNegligible = 1e-9;
 // What is left of a vector when others are projected out is none below this part of it.
@@ -194,7 +197,7 @@ struct WrenchDistribution::Workspace {
   Vector6 giveScaled(const Eigen::VectorXd& forces) const;
   void restrictToFace();
   DistributionStatus distribute(const Vector6& wrench);
-  bool passesCheck(const Vector6& wrench, double inequality) const;
+  bool passesCheck(const Vector6& wrench, double reach, double inequality) const;
   Vector6 give(const Eigen::VectorXd& forces) const;
   void takeAnswer();
   void keepAnswer();
@@ -347,7 +350,8 @@ bool WrenchDistribution::Workspace::minimizeCost(const Vector6& wrench) {
   iterations += direct.solver.iterations();
   lambda = direct.solver.x().cwiseQuotient(direct.scales);
   // The solver leaves out equalities that depend on others, whether they contradict or not.
-  return status == MinimumNorm::Status::Solved && passesCheck(wrench, 2. * kTolerance);
+  return status == MinimumNorm::Status::Solved &&
+         passesCheck(wrench, kExactWrench, kExactInequality);
 }
 
 // Does the same on the face of relax(), where equalities and inequalities may all but depend on
@@ -377,11 +381,11 @@ bool WrenchDistribution::Workspace::minimizeCostOnFace(const Vector6& wrench, do
     const double ratio = step > 0 ? missing.dot(former) / former.squaredNorm() : 0.;
     if (missing.norm() <= kRounding || (missing.norm() <= enough && step > 0 && !(ratio < 0.5)))
       break;
-    if (ratio > 1. - kLeastShrinking && missing.norm() <= kAccurateWrench / 10.) break;
+    if (ratio > 1. - kLeastShrinking && missing.norm() <= kExactWrench / 10.) break;
     // What shrinks slowly and evenly is the beginning of a geometric series.
     asked += missing / std::max(1. - std::max(ratio, 0.), kLeastShrinking);
   }
-  return passesCheck(wrench, kAccurateInequality);
+  return passesCheck(wrench, kAccurateWrench, kAccurateInequality);
 }
 
 // Finds the reachable wrench slackened to a target, which is weighted by D and over the scale, by
@@ -519,19 +523,20 @@ DistributionStatus WrenchDistribution::Workspace::distribute(const Vector6& wren
   if (minimizeCost(wrench)) return DistributionStatus::Solved;
 
   if (!relax(weighted(result.wrench_weights, wrench))) return DistributionStatus::NumericalFailure;
-  const bool relaxed = distance.norm() > kReach;
   on_face = true;
   // Large forces that cancel out want a larger tolerance.
   const Vector6 closest = wrench - distance.cwiseQuotient(result.wrench_weights);
   for (const double tolerance : {kTolerance, 10. * kTolerance, 100. * kTolerance})
     if (minimizeCostOnFace(closest, tolerance))
-      return relaxed ? DistributionStatus::Relaxed : DistributionStatus::Solved;
+      return weighted(result.wrench_weights, wrench - give(lambda)).norm() <= kReach
+                 ? DistributionStatus::Solved
+                 : DistributionStatus::Relaxed;
   return DistributionStatus::NumericalFailure;
 }
 
-bool WrenchDistribution::Workspace::passesCheck(const Vector6& wrench, double inequality) const {
-  if (!(weighted(result.wrench_weights, give(lambda) - wrench).norm() <= kAccurateWrench))
-    return false;
+bool WrenchDistribution::Workspace::passesCheck(const Vector6& wrench, double reach,
+                                                double inequality) const {
+  if (!(weighted(result.wrench_weights, give(lambda) - wrench).norm() <= reach)) return false;
   inequality *= std::max(1., lambda.lpNorm<Eigen::Infinity>());
   Eigen::Index col = 0;
   for (const Contact& contact : result.contacts) {

@@ -162,6 +162,9 @@ Verdict check(const Problem& problem, const dynacom::DistributionResult& result)
   const Real cost_scale = cost + nothing * nothing;
   Real certain = std::numeric_limits<Real>::infinity(), nearby = certain;
   const bool on_face = normal_norm > 0.;
+  // Within 1e-8 of the scale a wrench counts as reached, and which one is given matters less.
+  const bool at_edge = result.status == DistributionStatus::Solved;
+  const Real difference = std::max(1e-12 * scale, at_edge ? 0.01 * distance : 0.L);
   for (int power = -7; power <= (on_face ? 24 : -7); ++power) {
     const Real along =
         power > -7 ? std::pow(Real(10), Real(power) / 2) * nu_norm / normal_norm : Real(0);
@@ -176,8 +179,8 @@ Verdict check(const Problem& problem, const dynacom::DistributionResult& result)
       gap += std::max<Real>(0., support(contact, g)) * normal - g.dot(forces[k]);
     }
     certain = std::min(certain, gap / cost_scale);
-    // The same for a wrench that differs by 1e-12 of the scale along y.
-    const Real other = along * normal_norm * 1e-12 * scale / cost_scale;
+    // The same for a wrench that differs by that much along the normal.
+    const Real other = along * normal_norm * difference / cost_scale;
     if (other <= 1e-2) nearby = std::min(nearby, gap / cost_scale - other);
   }
   verdict.cost_gap = static_cast<double>(certain);

