@@ -90,6 +90,7 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
     values->setConstant(2, frames, kNaN);
   result.status.resize(frames);
   result.residual.resize(6, frames);
+  Eigen::Matrix3Xd acceleration(3, frames);  // of the virtual repellent point, as DynaCoM's
 
   for (Eigen::Index frame = 0; frame < frames; ++frame) {
     for (std::size_t k = 0; k < schedule.names.size(); ++k) {
@@ -114,13 +115,13 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
       worker.distributeForce(worker.getGroundCoMForce(), worker.getGroundCoMTorque(),
                              worker.getCoM());
     result.status[frame] = worker.getDistributionStatus();
-    result.residual.col(frame) = worker.ne_b();
+    result.residual.col(frame) = worker.getDistribution().residual;
+    acceleration.col(frame) =
+        settings.flat_horizontal_ground ? worker.getACoM() : worker.getFeasibleACoM();
     for (std::size_t k = 0; k < contacts.size(); ++k) {
       const ContactBase& contact = *contacts[k];
       result.contacts[k].wrench.col(frame).head(contact.cols()) = contact.appliedForce();
-      const DynaCoM::Vector6 given = contact.toCoMForces();
-      result.contacts[k].vertical_force[frame] = given.z();
-      result.residual.col(frame) -= given;
+      result.contacts[k].vertical_force[frame] = contact.toCoMForces().z();
     }
     if (settings.progress && (frame + 1) % kProgressFrames == 0) settings.progress(frame + 1);
   }
@@ -136,7 +137,7 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
     CentroidalState state;
     for (Eigen::Index frame = 0; frame < frames; ++frame) {
       state.com = result.com.col(frame);
-      state.acom = result.acom.col(frame);
+      state.acom = acceleration.col(frame);
       result.vrp.col(frame) = computeVRP(state, result.omega);
     }
     result.nl = result.cop - result.vrp;  // (8)
