@@ -4,7 +4,7 @@
 
 #include <pinocchio/algorithm/centroidal.hpp>
 
-#include "talos.hpp"
+#include "robots.hpp"
 
 namespace {
 

@@ -15,6 +15,12 @@ void printForces(const dynacom::DynaCoM& talos) {
   }
 }
 
+void show(const char* what, const Eigen::Ref<const Eigen::VectorXd>& values, const char* unit) {
+  std::printf("  %-22s", what);
+  for (const double value : values) std::printf(" %8.3f", value);
+  std::printf("  %s\n", unit);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -46,16 +52,27 @@ int main(int argc, char** argv) {
   std::printf("At rest on two soles (force [N] and moment [N·m] in the sole's frame): ");
   distribute();
 
+  // How close to the edge is that? For the whole: how much any component of the wrench may change.
+  // For a sole: where it is pressed, and how far that is from its nearest edge.
+  using Number = Eigen::Matrix<double, 1, 1>;
+  show("margin", Number(talos.computeWrenchMargin().margin), "N");
+  show("left CoP", talos.getContactCoP("left"), "m");
+  show("left CoP's margin", Number(talos.getContactCoPMargin("left")), "m");
+
   // Settings may change at any time, and act on the next call.
   std::printf("With a left sole that shall carry less: ");
   auto left = std::static_pointer_cast<dynacom::Contact6D>(talos.getContact("left"));
   left->setForceWeights(Eigen::Vector3d(1., 1., 2.));
   distribute();
 
-  // The CoM is not above the right sole: it cannot hold Talos alone.
+  // The CoM is not above the right sole: it cannot hold Talos alone. Its force is the best that it
+  // can give. What is missing of the wrench makes Talos fall.
   std::printf("With the left foot off the ground: ");
   talos.deactivateContact("left");
   distribute();
+  show("missing force", talos.getDistribution().residual.head<3>(), "N");
+  show("missing moment", talos.getDistribution().residual.tail<3>(), "N·m");
+  show("the CoM accelerates by", talos.getFeasibleACoM(), "m/s²");
 
   // On uneven ground the centre of pressure comes from the forces of the contacts.
   talos.activateContact("left");

@@ -14,6 +14,10 @@ def show_forces(talos):
         print(f"  {name:<6}" + "".join(f" {value:8.2f}" for value in force))
 
 
+def show(what, values, unit):
+    print(f"  {what:<22}" + "".join(f" {value:8.3f}" for value in values) + f"  {unit}")
+
+
 talos = dynacom.DynaCoM(dynacom.load_robot("talos").model)
 
 # A sole is a rectangle that pushes, with friction; the cost of its force is ½ Σ (wᵢ λᵢ)².
@@ -41,15 +45,25 @@ def distribute():
 print("At rest on two soles (force [N] and moment [N·m] in the sole's frame): ", end="")
 distribute()
 
+# How close to the edge is that? For the whole: how much any component of the wrench may change.
+# For a sole: where it is pressed, and how far that is from its nearest edge.
+show("margin", [talos.computeWrenchMargin().margin], "N")
+show("left CoP", talos.getContactCoP("left"), "m")
+show("left CoP's margin", [talos.getContactCoPMargin("left")], "m")
+
 # Settings may change at any time, and act on the next call.
 print("With a left sole that shall carry less: ", end="")
 talos.getContact("left").setForceWeights(np.array([1, 1, 2]))
 distribute()
 
-# The CoM is not above the right sole: it cannot hold Talos alone.
+# The CoM is not above the right sole: it cannot hold Talos alone. Its force is the best that it can
+# give. What is missing of the wrench makes Talos fall.
 print("With the left foot off the ground: ", end="")
 talos.deactivateContact("left")
 distribute()
+show("missing force", talos.getDistribution().residual[:3], "N")
+show("missing moment", talos.getDistribution().residual[3:], "N·m")
+show("the CoM accelerates by", talos.getFeasibleACoM(), "m/s²")
 
 # On uneven ground the centre of pressure comes from the forces of the contacts.
 talos.activateContact("left")

@@ -1,4 +1,4 @@
-"""Plan the walks of the examples with crocoddyl: ``talos_walk.npz`` and ``anymal_walk.npz``.
+"""Plan the motions in ``examples/data`` with crocoddyl: walks of Talos and ANYmal, ANYmal's trot.
 
 DynaCoM does not need crocoddyl: the examples only read the files that this script has written. To
 write them again, give crocoddyl an environment of its own::
@@ -13,7 +13,7 @@ for both versions as above, and for nothing that needs a newer pin. ``ROBOTS`` i
 without ``--robots`` the one on ``sys.path`` is taken (crocoddyl brings that of 5.0.0, where the
 URDFs and SRDFs of these two robots are the same).
 
-Each walk comes from the simple gait problems of ``crocoddyl.utils``. Its cycles are planned one
+Each motion comes from the simple gait problems of ``crocoddyl.utils``. Its cycles are planned one
 after the other, each from the state in which the last one ends. With a halt added they are then
 solved once more as a single problem, from that first guess, so that each step prepares the next.
 :class:`Feasible` tells what is changed in the problems of crocoddyl, and why.
@@ -75,7 +75,7 @@ class Robot:
 
     urdf: str
     srdf: str
-    reference: str  # the configuration of the SRDF in which the walk begins
+    reference: str  # the configuration of the SRDF in which the motion begins
     contacts: dict[str, str]  # name of each contact, and its frame
     feet: tuple[str, ...]  # those frames, in the order that crocoddyl's problem takes them
     frame_height: float  # of those frames above the ground
@@ -147,6 +147,17 @@ GAITS = {
         support_knots=6,
         halt_knots=30,
         least_contacts=3,
+    ),
+    "anymal_trot": Gait(
+        ANYMAL,
+        "createTrottingProblem",
+        cycles=4,
+        step_length=0.2,
+        step_height=0.08,
+        step_knots=15,
+        support_knots=4,
+        halt_knots=30,
+        least_contacts=2,
     ),
 }
 

@@ -19,7 +19,7 @@ using Contact = DistributionResult::Contact;
 using Vector6 = DistributionResult::Vector6;
 using NewtonEuler = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
-// All of these are for a problem that was divided by the scale, so that its wrench has unit size.
+// All of these are for a problem whose weighted wrench has unit size.
 
 // A wrench no farther than this from what the contacts can give is within reach.
 constexpr double kReach = 1e-8;
@@ -67,6 +67,17 @@ Vector6 weighted(const Vector6& weights, const Vector6& wrench) {
   return weights.cwiseProduct(wrench);
 }
 
+// What D amounts to for a wrench: forces in newtons are a weighted wrench over this.
+double overallWeight(const Vector6& weights, const Vector6& wrench) {
+  const double size = wrench.stableNorm();
+  return size > 0. ? weighted(weights, wrench).stableNorm() / size : weights.maxCoeff();
+}
+
+bool haveSameSettings(const Contact& a, const Contact& b) {
+  return a.A.rows() == b.A.rows() && a.A.cols() == b.A.cols() && a.A == b.A &&
+         a.weights == b.weights;
+}
+
 }  // namespace
 
 const char* to_string(DistributionStatus status) {
@@ -102,6 +113,7 @@ Eigen::VectorXd DistributionResult::forces() const {
 }
 
 bool DistributionResult::isOptimal(double tolerance) const {
+  const double unit = scale / overallWeight(wrench_weights, wrench);  // of forces
   const bool relaxed = status == DistributionStatus::Relaxed;
   if (!relaxed && status != DistributionStatus::Solved && status != DistributionStatus::NoContact)
     return false;
@@ -116,14 +128,14 @@ bool DistributionResult::isOptimal(double tolerance) const {
   for (const Contact& contact : contacts) {
     given += contact.NE * contact.force;
     const Eigen::VectorXd slack = contact.A * contact.force;
-    if (!(slack.array() <= tolerance * scale).all()) return false;
+    if (!(slack.array() <= tolerance * unit).all()) return false;
 
     // The minimum of the cost: W² λ − NEᵀ ν + Aᵀ μ = 0.
     const Eigen::VectorXd of_cost = contact.weights.cwiseAbs2().cwiseProduct(contact.force);
     const Eigen::VectorXd of_wrench = contact.NE.transpose() * wrench_multipliers;
     const Eigen::VectorXd of_bounds = contact.A.transpose() * contact.multipliers;
     const double terms =
-        std::max({kNegligible * scale * contact.weights.cwiseAbs2().maxCoeff(),
+        std::max({kNegligible * unit * contact.weights.cwiseAbs2().maxCoeff(),
                   of_cost.lpNorm<Eigen::Infinity>(),
                   (contact.NE.cwiseAbs().transpose() * wrench_multipliers.cwiseAbs()).maxCoeff(),
                   (contact.A.cwiseAbs().transpose() * contact.multipliers.cwiseAbs()).maxCoeff()});
@@ -132,7 +144,7 @@ bool DistributionResult::isOptimal(double tolerance) const {
     for (Eigen::Index j = 0; j < slack.size(); ++j) {
       const bool held = contact.relaxation_multipliers[j] > 0.;
       if (!held && !(contact.multipliers[j] >= -tolerance * terms)) return false;
-      if (contact.multipliers[j] != 0. && !(std::abs(slack[j]) <= tolerance * scale)) return false;
+      if (contact.multipliers[j] != 0. && !(std::abs(slack[j]) <= tolerance * unit)) return false;
     }
 
     // The slackened wrench: NEᵀ D² r = Aᵀ μ'.
@@ -142,7 +154,7 @@ bool DistributionResult::isOptimal(double tolerance) const {
     const Eigen::VectorXd of_relaxation = contact.A.transpose() * contact.relaxation_multipliers;
     if (!((of_pull - of_relaxation).lpNorm<Eigen::Infinity>() <=
           (tolerance * pull.lpNorm<Eigen::Infinity>() +
-           kTolerance * scale * wrench_weights.maxCoeff()) *
+           kMissing * unit * wrench_weights.cwiseAbs2().maxCoeff()) *
               std::max(1., contact.NE.lpNorm<Eigen::Infinity>())))
       return false;
   }
@@ -152,8 +164,8 @@ bool DistributionResult::isOptimal(double tolerance) const {
 
 struct WrenchDistribution::Workspace {
   // The contacts side by side, as a problem of least norm. Its variable begins with the forces λ,
-  // each times its scale; the columns of E are the rows of NE over the scales, at unit length,
-  // those of G the rows of A over the scales.
+  // each times its scale; the columns of E are the rows of NE over the units, at unit length,
+  // those of G the rows of A over the units.
   struct Program {
     Eigen::VectorXd scales;  // n
     Eigen::MatrixXd E, G;
@@ -163,17 +175,24 @@ struct WrenchDistribution::Workspace {
   };
 
   DistributionResult result;
-  std::size_t added = 0;    // contacts since clear(): the first of result.contacts
-  bool has_answer = false;  // whether the forces in result are an answer for these contacts
+  Vector6 settings = Vector6::Ones();  // D of the next solve()
+  std::vector<Contact> added;  // since clear(), the first `count`: those of the next solve()
+  std::size_t count = 0;
+  bool has_answer = false;  // whether the forces in result are an answer for its contacts
+
+  // What forces and wrenches are divided by, and D over its overall weight: for weights of 1 the
+  // unit is the scale, and it is the same for all common factors of the weights.
+  double unit = 0., overall_weight = 1.;
+  Vector6 wrench_weights = Vector6::Ones();
 
   Eigen::Index n = 0, m = 0;  // components of λ, inequalities
   double largest_weight = 0.;
   Program direct, slackened;  // without and with slacks
   int iterations = 0;
-  Eigen::VectorXd lambda;          // the forces at hand, over the scale
+  Eigen::VectorXd lambda;          // the forces at hand, over the unit
   Eigen::VectorXd scaled, change;  // of relax(): forces times their scales, and the last step
-  Vector6 distance;                // of relax(): D (w − NE λ) over the scale
-  Eigen::VectorXd relaxation_multipliers;  // of relax(), over the scale
+  Vector6 distance;                // of relax(): D (w − NE λ) over the unit
+  Eigen::VectorXd relaxation_multipliers;  // of relax(), over the unit
   bool on_face = false;  // whether the forces at hand are those of minimizeCostOnFace()
   // Of restrictToFace(), contact by contact along the diagonals: a basis for x of the cheapest
   // forces, its first vectors times R are the normals of inequalities that are equations there; and
@@ -186,7 +205,7 @@ struct WrenchDistribution::Workspace {
   Eigen::Array<bool, Eigen::Dynamic, 1> active;
 
   Contact& nextContact();
-  void count();
+  void takeProblem();
   void assemble(Program& program, const Vector6& row_weights, double slack);
   void assembleCheapest(Program& program, double slack);
   void assembleClosest(double proximity);
@@ -218,45 +237,34 @@ WrenchDistribution::~WrenchDistribution() = default;
 void WrenchDistribution::setWrenchWeights(const Vector6& weights) {
   if (!weights.allFinite() || !(weights.array() > 0.).all())
     throwInvalid("wrench weights must be finite and > 0, got ", weights.transpose());
-  if (weights != work_->result.wrench_weights) work_->has_answer = false;
-  work_->result.wrench_weights = weights;
+  if (weights != work_->settings) work_->has_answer = false;
+  work_->settings = weights;
 }
 
-const Vector6& WrenchDistribution::getWrenchWeights() const { return work_->result.wrench_weights; }
+const Vector6& WrenchDistribution::getWrenchWeights() const { return work_->settings; }
 
-void WrenchDistribution::clear() { work_->added = 0; }
+void WrenchDistribution::clear() { work_->count = 0; }
 
 void WrenchDistribution::forgetForces() { work_->has_answer = false; }
 
 const DistributionResult& WrenchDistribution::result() const { return work_->result; }
 
-// The contact to be filled in: that of the problem before, so that it can be compared, or a new
-// one.
+// The contact to be filled in.
 Contact& WrenchDistribution::Workspace::nextContact() {
-  if (added == result.contacts.size()) {
-    result.contacts.emplace_back();
-    has_answer = false;
-  }
-  return result.contacts[added++];
+  if (count == added.size()) added.emplace_back();
+  return added[count++];
 }
 
 void WrenchDistribution::add(const ContactBase& contact) {
   if (contact.cols() == 0) throwInvalid("a contact was never initialised");
   if (!(contact.uni_b().array() == 0.).all() || !(contact.fri_b().array() == 0.).all())
     throwInvalid("uni_b and fri_b of contact '", contact.getFrameName(), "' must be zero");
-  Contact& added = work_->nextContact();
-  const Eigen::Index rows = contact.uni_rows() + contact.fri_rows();
-  if (added.A.rows() != rows || added.A.cols() != contact.cols() ||
-      added.A.topRows(contact.uni_rows()) != contact.uni_A() ||
-      added.A.bottomRows(contact.fri_rows()) != contact.fri_A() ||
-      added.weights != contact.reg_A()) {
-    work_->has_answer = false;
-    added.A.resize(rows, contact.cols());
-    added.A.topRows(contact.uni_rows()) = contact.uni_A();
-    added.A.bottomRows(contact.fri_rows()) = contact.fri_A();
-    added.weights = contact.reg_A();
-  }
-  added.NE = contact.ne_A();
+  Contact& next = work_->nextContact();
+  next.A.resize(contact.uni_rows() + contact.fri_rows(), contact.cols());
+  next.A.topRows(contact.uni_rows()) = contact.uni_A();
+  next.A.bottomRows(contact.fri_rows()) = contact.fri_A();
+  next.weights = contact.reg_A();
+  next.NE = contact.ne_A();
 }
 
 void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
@@ -268,21 +276,25 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
   if (!A.allFinite()) throwInvalid("A must be finite");
   if (!weights.allFinite() || !(weights.array() > 0.).all())
     throwInvalid("weights must be finite and > 0, got ", weights.transpose());
-  Contact& added = work_->nextContact();
-  if (added.A.rows() != A.rows() || added.A.cols() != A.cols() || added.A != A ||
-      added.weights != weights) {
-    work_->has_answer = false;
-    added.A = A;
-    added.weights = weights;
-  }
-  added.NE = NE;
+  Contact& next = work_->nextContact();
+  next.A = A;
+  next.weights = weights;
+  next.NE = NE;
 }
 
-// Counts what the contacts have.
-void WrenchDistribution::Workspace::count() {
+// The contacts that were added become those of the result, which keeps its forces if only their
+// places have changed.
+void WrenchDistribution::Workspace::takeProblem() {
+  has_answer = has_answer && result.contacts.size() == count;
+  result.contacts.resize(count);
   n = m = 0;
   largest_weight = 0.;
-  for (const Contact& contact : result.contacts) {
+  for (std::size_t k = 0; k < count; ++k) {
+    Contact& contact = result.contacts[k];
+    has_answer = has_answer && haveSameSettings(contact, added[k]);
+    contact.A = added[k].A;
+    contact.weights = added[k].weights;
+    contact.NE = added[k].NE;
     n += contact.A.cols();
     m += contact.A.rows();
     largest_weight = std::max(largest_weight, contact.weights.maxCoeff());
@@ -333,13 +345,13 @@ void WrenchDistribution::Workspace::assembleClosest(double proximity) {
   Eigen::Index col = 0;
   for (const Contact& contact : result.contacts)
     for (Eigen::Index i = 0; i < contact.NE.cols(); ++i, ++col) {
-      slackened.scales[col] = weighted(result.wrench_weights, contact.NE.col(i)).norm();
+      slackened.scales[col] = weighted(wrench_weights, contact.NE.col(i)).norm();
       if (slackened.scales[col] == 0.) slackened.scales[col] = 1.;
     }
-  assemble(slackened, result.wrench_weights, proximity);
+  assemble(slackened, wrench_weights, proximity);
 }
 
-// Finds the cheapest forces that give a wrench, which is over the scale. False if there are none,
+// Finds the cheapest forces that give a wrench, which is over the unit. False if there are none,
 // or hardly any.
 bool WrenchDistribution::Workspace::minimizeCost(const Vector6& wrench) {
   assembleCheapest(direct, 0.);
@@ -388,7 +400,7 @@ bool WrenchDistribution::Workspace::minimizeCostOnFace(const Vector6& wrench, do
   return passesCheck(wrench, kAccurateWrench, kAccurateInequality);
 }
 
-// Finds the reachable wrench slackened to a target, which is weighted by D and over the scale, by
+// Finds the reachable wrench closest to a target, which is weighted by D and over the unit, by
 // the proximal point method: with e = D NE, columns at unit length, and λ̃ the forces in that scale,
 //
 //     minimise ½ ‖e λ̃ − target‖² + ½ δ ‖λ̃ − λ̃₀‖²   subject to   A λ ≤ 0
@@ -428,7 +440,7 @@ bool WrenchDistribution::Workspace::relax(const Vector6& target) {
     }
   }
   lambda = scaled.cwiseQuotient(slackened.scales);
-  relaxation_multipliers = proximity * solver.z();
+  relaxation_multipliers = proximity * solver.z().cwiseMax(0.);
   return true;
 }
 
@@ -513,7 +525,7 @@ void WrenchDistribution::Workspace::restrictToFace() {
   }
 }
 
-// Finds the forces, over the scale, for a wrench over the scale.
+// Finds the forces, over the unit, for a wrench over the unit.
 DistributionStatus WrenchDistribution::Workspace::distribute(const Vector6& wrench) {
   iterations = 0;
   relaxation_multipliers.setZero(m);
@@ -522,13 +534,13 @@ DistributionStatus WrenchDistribution::Workspace::distribute(const Vector6& wren
   products.resize(n);
   if (minimizeCost(wrench)) return DistributionStatus::Solved;
 
-  if (!relax(weighted(result.wrench_weights, wrench))) return DistributionStatus::NumericalFailure;
+  if (!relax(weighted(wrench_weights, wrench))) return DistributionStatus::NumericalFailure;
   on_face = true;
   // Large forces that cancel out want a larger tolerance.
-  const Vector6 closest = wrench - distance.cwiseQuotient(result.wrench_weights);
+  const Vector6 closest = wrench - distance.cwiseQuotient(wrench_weights);
   for (const double tolerance : {kTolerance, 10. * kTolerance, 100. * kTolerance})
     if (minimizeCostOnFace(closest, tolerance))
-      return weighted(result.wrench_weights, wrench - give(lambda)).norm() <= kReach
+      return weighted(wrench_weights, wrench - give(lambda)).norm() <= kReach
                  ? DistributionStatus::Solved
                  : DistributionStatus::Relaxed;
   return DistributionStatus::NumericalFailure;
@@ -536,7 +548,7 @@ DistributionStatus WrenchDistribution::Workspace::distribute(const Vector6& wren
 
 bool WrenchDistribution::Workspace::passesCheck(const Vector6& wrench, double reach,
                                                 double inequality) const {
-  if (!(weighted(result.wrench_weights, give(lambda) - wrench).norm() <= reach)) return false;
+  if (!(weighted(wrench_weights, give(lambda) - wrench).norm() <= reach)) return false;
   inequality *= std::max(1., lambda.lpNorm<Eigen::Infinity>());
   Eigen::Index col = 0;
   for (const Contact& contact : result.contacts) {
@@ -560,8 +572,9 @@ Vector6 WrenchDistribution::Workspace::give(const Eigen::VectorXd& forces) const
 
 // Writes forces and multipliers into the result.
 void WrenchDistribution::Workspace::takeAnswer() {
-  const double scale = result.scale;
-  const double cost_scale = scale * largest_weight * largest_weight;
+  const double cost_scale = unit * largest_weight * largest_weight;
+  // D² is the square of the relative weights times this.
+  const double distance_scale = unit * overall_weight * overall_weight;
   const Program& program = on_face ? slackened : direct;
   const MinimumNorm& solver = program.solver;
   result.iterations = iterations;
@@ -574,8 +587,8 @@ void WrenchDistribution::Workspace::takeAnswer() {
   Eigen::Index col = 0, row = 0;
   for (Contact& contact : result.contacts) {
     const Eigen::Index rows = contact.A.rows(), cols = contact.A.cols();
-    contact.force = scale * lambda.segment(col, cols);
-    contact.relaxation_multipliers = scale * relaxation_multipliers.segment(row, rows);
+    contact.force = unit * lambda.segment(col, cols);
+    contact.relaxation_multipliers = distance_scale * relaxation_multipliers.segment(row, rows);
 
     // Those of held inequalities make up for what is missing: x + E y + G z = 0.
     Eigen::Index size = 0;
@@ -628,32 +641,34 @@ void WrenchDistribution::Workspace::sumUp() {
 DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minimalScale) {
   Workspace& work = *work_;
   DistributionResult& result = work.result;
-  if (work.added != result.contacts.size()) {
-    result.contacts.resize(work.added);
-    work.has_answer = false;
-  }
-  work.count();
+  work.takeProblem();
   work.iterations = 0;
   result.wrench = wrench;
-  result.scale = std::max(minimalScale, weighted(result.wrench_weights, wrench).stableNorm());
+  const Vector6& weights = work.settings;
+  result.wrench_weights = weights;
+  work.overall_weight = overallWeight(weights, wrench);
+  result.scale = std::max(minimalScale, weighted(weights, wrench).stableNorm());
+  work.unit = result.scale / work.overall_weight;
+  work.wrench_weights = weights / work.overall_weight;
 
   bool finite = wrench.allFinite() && std::isfinite(minimalScale);
   for (const Contact& contact : result.contacts) finite = finite && contact.NE.allFinite();
   if (!finite) {
     result.status = DistributionStatus::InvalidInput;
-  } else if (!std::isfinite(result.scale)) {  // beyond the largest numbers
+  } else if (!std::isfinite(work.unit) ||
+             !std::isfinite(result.scale)) {  // beyond the largest numbers
     result.status = DistributionStatus::NumericalFailure;
   } else if (work.n == 0) {
-    const bool zero = weighted(result.wrench_weights, wrench).norm() <= kReach * result.scale;
+    const bool zero = weighted(weights, wrench).stableNorm() <= kReach * result.scale;
     result.status = zero ? DistributionStatus::Solved : DistributionStatus::NoContact;
-  } else if (result.scale == 0.) {
+  } else if (work.unit == 0.) {
     work.has_answer = false;  // all forces are zero
     result.status = DistributionStatus::Solved;
   } else {
-    result.status = work.distribute(wrench / result.scale);
+    result.status = work.distribute(wrench / work.unit);
   }
 
-  if (work.n > 0 && result.scale > 0. &&
+  if (work.n > 0 && work.unit > 0. &&
       (result.status == DistributionStatus::Solved ||
        result.status == DistributionStatus::Relaxed)) {
     work.takeAnswer();
@@ -666,7 +681,7 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
 }
 
 // The largest s, but for what is above a bound, for which a wrench plus s times a direction is
-// reachable; all of them weighted and over the scale. From a point beyond, the plane between it and
+// reachable; all of them weighted and over the unit. From a point beyond, the plane between it and
 // the reachable wrenches cuts the line closer to where it leaves them, until it is there. Negative
 // if it fails.
 double WrenchDistribution::Workspace::findBoundary(const Vector6& wrench, const Vector6& direction,
@@ -675,6 +690,7 @@ double WrenchDistribution::Workspace::findBoundary(const Vector6& wrench, const 
   for (int step = 0; step < kMarginSteps && s > 0.; ++step) {
     // Only the direction of what is out of reach matters, because the reachable is a cone.
     const Vector6 target = std::isfinite(s) ? Vector6(wrench + s * direction) : direction;
+    if (target.norm() <= kMarginReach) break;  // no wrench at all
     if (!relax(target / target.norm())) return -1.;
     if (distance.norm() <= kMarginReach) break;
     const double cut = std::max(0., -distance.dot(wrench) / distance.dot(direction));
@@ -692,10 +708,12 @@ WrenchMargin WrenchDistribution::computeMargin() {
       result.status == DistributionStatus::NumericalFailure)
     return margin;
   margin.margin = 0.;
-  if (result.status == DistributionStatus::Relaxed) return margin;
+  if (result.status == DistributionStatus::Relaxed ||
+      result.status == DistributionStatus::NoContact)
+    return margin;
 
-  Vector6 wrench = weighted(result.wrench_weights, result.achieved);
-  if (result.scale > 0.) wrench /= result.scale;
+  Vector6 wrench = weighted(work.wrench_weights, result.achieved);
+  if (work.unit > 0.) wrench /= work.unit;
   double least = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 6; ++axis) {
     for (const int sign : {1, -1}) {
@@ -708,7 +726,7 @@ WrenchMargin WrenchDistribution::computeMargin() {
       }
     }
   }
-  margin.margin = result.scale > 0. ? result.scale * least : least;
+  margin.margin = work.unit > 0. ? result.scale * least : least;
   return margin;
 }
 

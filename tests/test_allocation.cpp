@@ -112,10 +112,17 @@ struct Standing {
 
   State moving() { return randomState(model, random, 0.02); }
 
-  /// One call, in which everything takes its size.
+  /// One call, in which everything takes its size. It is at rest, so that the wrench is in reach.
   void warmUp() {
-    const State x = moving();
+    const State x = restState(model);
     dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
+  }
+
+  std::vector<std::shared_ptr<ContactBase>> activeContacts() const {
+    std::vector<std::shared_ptr<ContactBase>> contacts;
+    for (const auto& name : dynacom.getActiveContacts())
+      contacts.push_back(dynacom.getContact(name));
+    return contacts;
   }
 
   DistributionStatus distribute() {
@@ -185,22 +192,53 @@ BOOST_AUTO_TEST_CASE(what_goes_wrong_in_the_world_allocates_nothing) {
   for (const bool onPoints : {false, true}) {
     Standing standing(onPoints);
     DynaCoM& dynacom = standing.dynacom;
+    BOOST_REQUIRE(dynacom.getDistributionStatus() == DistributionStatus::Solved);
     const Vector3d com = dynacom.getCoM();
     auto status = DistributionStatus::Solved;
     const auto distribute = [&](const Vector3d& force) {
       return allocationsIn([&] { status = dynacom.distributeForce(force, Vector3d::Zero(), com); });
     };
+    // In the first control tick that meets it, too.
     BOOST_TEST(distribute({0., 0., -500.}) == 0);
-    BOOST_TEST(status == DistributionStatus::Infeasible);
+    BOOST_TEST(status == DistributionStatus::Relaxed);
     BOOST_TEST(distribute({0., 0., 0. / 0.}) == 0);
+    BOOST_TEST(status == DistributionStatus::InvalidInput);
+    BOOST_TEST(distribute({1e308, 1e308, 1.7e308}) == 0);
     BOOST_TEST(status == DistributionStatus::NumericalFailure);
     BOOST_TEST(distribute({0., 0., 0.}) == 0);
+    BOOST_TEST(status == DistributionStatus::Solved);
+
+    // A sensor that fails.
+    State x = restState(standing.model);
+    x.v[0] = 0. / 0.;
+    for (const bool flat : {true, false}) {
+      BOOST_TEST(
+          allocationsIn([&] { dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), flat); }) == 0);
+      BOOST_TEST(!dynacom.isCoPDefined());
+    }
 
     // No contact at all, after a first time without.
     for (const auto& name : dynacom.getActiveContacts()) dynacom.deactivateContact(name);
     standing.warmUp();
     BOOST_TEST(distribute({0., 0., 500.}) == 0);
     BOOST_TEST(status == DistributionStatus::NoContact);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(motions_out_of_reach_allocate_nothing) {
+  for (const bool onPoints : {false, true}) {
+    Standing standing(onPoints);
+    DynaCoM& dynacom = standing.dynacom;
+    int relaxed = 0;
+    for (int trial = 0; trial < 20; ++trial) {
+      const State x = standing.moving();
+      const Vector6 external = standing.random.vector(6, 300.);
+      BOOST_TEST(allocationsIn([&] { dynacom.computeNL(3., x.q, x.v, x.a, external, false); }) ==
+                 0);
+      if (dynacom.getDistributionStatus() == DistributionStatus::Relaxed) ++relaxed;
+      BOOST_TEST(allocationsIn([&] { standing.distribute(); }) == 0);
+    }
+    BOOST_TEST(relaxed > 10);
   }
 }
 
@@ -215,6 +253,10 @@ BOOST_AUTO_TEST_CASE(getters_that_return_references_allocate_nothing) {
                       dynacom.getAMVariation().x() + dynacom.getGroundCoMForce().x() +
                       dynacom.getGroundCoMTorque().x() + dynacom.getCoP().x() +
                       dynacom.getVRP().x() + dynacom.getNL().x() + dynacom.ne_b().x() +
+                      dynacom.getFeasibleACoM().x() + dynacom.getFeasibleAMVariation().x() +
+                      dynacom.getMinimalVerticalForce() + dynacom.getWrenchWeights()[0] +
+                      dynacom.isCoPDefined() + dynacom.getDistribution().residual[0] +
+                      dynacom.getDistribution().contacts[0].force[0] +
                       dynacom.getSettings().gravity.z() + dynacom.getModel().nq +
                       dynacom.getData().com[0].x();
                const ContactBase& contact = *dynacom.getContact(name);
@@ -223,7 +265,9 @@ BOOST_AUTO_TEST_CASE(getters_that_return_references_allocate_nothing) {
                       contact.reg_A()[0] + contact.reg_b()[0] + contact.getPose().translation().x();
                // These are small enough to be returned on the stack.
                sum += contact.toWorldForces().x() + contact.toCoMForces().x() +
-                      contact.getCoP().x() + contact.getSurfacePose().translation().x();
+                      contact.getCoP().x() + contact.getSurfacePose().translation().x() +
+                      dynacom.getContactCoP(name).x() + dynacom.getContactFrictionUsage(name) +
+                      dynacom.getContactCoPMargin(name) + dynacom.getContactYawUsage(name);
              }) == 0);
   BOOST_TEST(std::isfinite(sum));
 }
@@ -241,29 +285,40 @@ BOOST_AUTO_TEST_CASE(what_dynacom_does_to_contacts_allocates_nothing) {
 }
 
 BOOST_AUTO_TEST_CASE(a_distribution_of_the_same_sizes_allocates_nothing) {
-  // Wrenches at the limit of friction, so that inequalities become active, and leave again.
+  // Wrenches at the limit of friction, so that inequalities become active, and leave again; on the
+  // boundary; and beyond it.
   for (const bool onPoints : {false, true}) {
     Standing standing(onPoints);
-    std::vector<std::shared_ptr<ContactBase>> contacts;
-    for (const auto& name : standing.dynacom.getActiveContacts())
-      contacts.push_back(standing.dynacom.getContact(name));
+    const auto contacts = standing.activeContacts();
     WrenchDistribution distribution;
-    for (int trial = 0; trial < 200; ++trial) {
-      Vector6 wrench = Vector6::Zero();
-      for (const auto& contact : contacts) {
-        const double fz = standing.random.uniform(10., 300.);
-        VectorXd force = VectorXd::Zero(contact->cols());
-        force.head<3>() << standing.random.vector(2, 0.7 * fz), fz;
-        wrench += contact->ne_A() * force;
-      }
+    const auto solve = [&](const Vector6& wrench, int trial) {
       auto status = DistributionStatus::NoContact;
       const int allocated = allocationsIn([&] {
         distribution.clear();
         for (const auto& contact : contacts) distribution.add(*contact);
         status = distribution.solve(wrench);
       });
-      BOOST_TEST(status == DistributionStatus::Solved);
       if (trial > 0) BOOST_TEST(allocated == 0);
+      return status;
+    };
+    for (int trial = 0; trial < 200; ++trial) {
+      Vector6 within = Vector6::Zero(), boundary = Vector6::Zero();
+      for (const auto& contact : contacts) {
+        const double fz = standing.random.uniform(10., 300.);
+        VectorXd force = VectorXd::Zero(contact->cols());
+        force.head<3>() << standing.random.vector(2, 0.7 * fz), fz;
+        within += contact->ne_A() * force;
+        // On the same facet in all contacts, which stand level.
+        force[0] = 0.7 * fz;
+        boundary += contact->ne_A() * force;
+      }
+      BOOST_TEST(solve(within, trial) == DistributionStatus::Solved);
+      solve(boundary, trial);
+      Vector6 beyond = within;
+      beyond[0] += 2. * within[2];
+      BOOST_TEST(solve(beyond, trial) == DistributionStatus::Relaxed);
+      BOOST_TEST(solve(standing.random.vector(6, 1000.), trial) !=
+                 DistributionStatus::NumericalFailure);
     }
   }
 }

@@ -173,6 +173,52 @@ BOOST_AUTO_TEST_CASE(ground_wrench_by_hand) {
   BOOST_TEST(close(free.torque, Vector3d(6., 7., 8.)));
 }
 
+BOOST_AUTO_TEST_CASE(accelerations_that_a_ground_wrench_causes_by_hand) {
+  // c̈ = (f + f_e)/m + g, L̇ = τ + τ_e
+  const CentroidalState state = someState();
+  const CentroidalWrench wrench{Vector3d(20., -30., 80.), Vector3d(1., 2., 3.)};
+  const Vector3d gravity(0.5, 0., -10.);
+  Vector6 external;
+  external << 10., 20., 30., 4., 5., 6.;
+  const CentroidalState caused = applyGroundWrench(state, wrench, gravity, external);
+  BOOST_TEST(close(caused.acom, Vector3d(3.5, -1., 1.)));
+  BOOST_TEST(close(caused.amVariation, Vector3d(5., 7., 9.)));
+
+  // Without an external wrench.
+  const CentroidalState free = applyGroundWrench(state, wrench, gravity);
+  BOOST_TEST(close(free.acom, Vector3d(2.5, -3., -2.)));
+  BOOST_TEST(close(free.amVariation, Vector3d(1., 2., 3.)));
+
+  // All else is the state's.
+  for (const CentroidalState& same : {caused, free}) {
+    BOOST_TEST(same.mass == state.mass);
+    BOOST_TEST(close(same.com, state.com, 0.));
+    BOOST_TEST(close(same.vcom, state.vcom, 0.));
+    BOOST_TEST(close(same.am, state.am, 0.));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(the_ground_wrench_of_a_motion_causes_that_motion) {
+  Random random(10);
+  for (const auto& model : randomRobots(random, 10)) {
+    const CentroidalState state = stateOf(model, randomState(model, random));
+    const Vector3d gravity = random.vector3(10.);
+    const Vector6 external = random.vector(6, 100.);
+    const auto wrench = computeGroundWrench(state, gravity, external);
+    const CentroidalState caused = applyGroundWrench(state, wrench, gravity, external);
+    BOOST_TEST(close(caused.acom, state.acom, 1e-12));
+    BOOST_TEST(close(caused.amVariation, state.amVariation, 1e-12));
+    // A push of 1 N more accelerates by 1/m, and no ground at all leaves free fall.
+    CentroidalWrench more = wrench;
+    more.force.x() += 1.;
+    BOOST_TEST(close(applyGroundWrench(state, more, gravity, external).acom - caused.acom,
+                     Vector3d(1. / totalMass(model), 0., 0.), 1e-12));
+    const CentroidalWrench none{Vector3d::Zero(), Vector3d::Zero()};
+    BOOST_TEST(close(applyGroundWrench(state, none, gravity).acom, gravity, 0.));
+    BOOST_TEST(close(applyGroundWrench(state, none, gravity).amVariation, Vector3d::Zero(), 0.));
+  }
+}
+
 BOOST_AUTO_TEST_CASE(at_rest_the_ground_carries_the_weight_below_the_com) {
   Random random(8);
   for (const auto& model : randomRobots(random, 5)) {
@@ -218,8 +264,39 @@ BOOST_AUTO_TEST_CASE(without_vertical_force_there_is_no_centre_of_pressure) {
     wrench.force.z() = fz;
     BOOST_TEST(allNaN(computeFlatGroundCoP(wrench, Vector3d::Ones())));
   }
-  wrench.force.z() = 1.001;
-  BOOST_TEST(computeFlatGroundCoP(wrench, Vector3d::Ones()).allFinite());
+  for (const double fz : {1., 1.001}) {
+    wrench.force.z() = fz;
+    BOOST_TEST(computeFlatGroundCoP(wrench, Vector3d::Ones()).allFinite());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(the_least_vertical_force_is_up_to_the_caller) {
+  const Vector3d com(1., 2., 0.8);
+  for (const double least : {1e-6, 0.5, 1., 50., 1e6}) {
+    CentroidalWrench wrench{Vector3d(0.1, 0.2, 0.), Vector3d(0.3, 0.4, 0.5)};
+    for (const double fz : {0.999 * least, 0., -2. * least, kNaN}) {
+      wrench.force.z() = fz;
+      BOOST_TEST(allNaN(computeFlatGroundCoP(wrench, com, 0.3, least)));
+    }
+    for (const double fz : {least, 2. * least}) {
+      wrench.force.z() = fz;
+      BOOST_TEST(close(computeFlatGroundCoP(wrench, com, 0.3, least),
+                       Vector2d(1. + (-0.4 - 0.1 * 0.5) / fz, 2. + (0.3 - 0.2 * 0.5) / fz)));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_centre_of_pressure_beyond_the_largest_numbers_is_none) {
+  CentroidalWrench wrench{Vector3d(0., 0., 1e-300), Vector3d(0., 1e10, 0.)};
+  BOOST_TEST(allNaN(computeFlatGroundCoP(wrench, Vector3d::Zero(), 0., 1e-305)));
+  wrench.torque << 1e10, 0., 0.;
+  BOOST_TEST(allNaN(computeFlatGroundCoP(wrench, Vector3d::Zero(), 0., 1e-305)));
+  // What is not finite comes from sensors, too.
+  wrench.force.z() = 100.;
+  wrench.torque.x() = std::numeric_limits<double>::infinity();
+  BOOST_TEST(allNaN(computeFlatGroundCoP(wrench, Vector3d::Zero())));
+  wrench.torque.x() = kNaN;
+  BOOST_TEST(allNaN(computeFlatGroundCoP(wrench, Vector3d::Zero())));
 }
 
 BOOST_AUTO_TEST_CASE(virtual_repellent_point_by_hand) {

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-2-Clause
 // What every contact does, shown on the two that there are and on one of our own.
 #define BOOST_TEST_MODULE contact_base
+#include <cmath>
+#include <functional>
 #include <limits>
+#include <tuple>
+#include <vector>
 
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_base.hpp"
@@ -51,6 +55,45 @@ std::shared_ptr<ContactPoint> point() {
 std::vector<std::shared_ptr<ContactBase>> allKinds() {
   return {sole(), point(), std::make_shared<SuctionCup>()};
 }
+
+/// What settings there are, and each of their fields changed in turn.
+template <class Contact>
+struct Kind;
+
+template <>
+struct Kind<Contact6D> {
+  using Settings = Contact6DSettings;
+  static std::vector<std::function<void(Settings&)>> changes() {
+    std::vector<std::function<void(Settings&)>> list = {
+        [](auto& settings) { settings.mu += 0.5; },
+        [](auto& settings) { settings.gu += 0.5; },
+        [](auto& settings) { settings.half_length += 0.5; },
+        [](auto& settings) { settings.half_width += 0.5; },
+        [](auto& settings) { settings.frame_name += "_"; },
+    };
+    for (Index i = 0; i < 6; ++i)
+      list.push_back([i](auto& settings) { settings.weights[i] += 0.5; });
+    return list;
+  }
+};
+
+template <>
+struct Kind<ContactPoint> {
+  using Settings = ContactPointSettings;
+  static std::vector<std::function<void(Settings&)>> changes() {
+    std::vector<std::function<void(Settings&)>> list = {
+        [](auto& settings) { settings.mu += 0.5; },
+        [](auto& settings) { settings.frame_name += "_"; },
+        [](auto& settings) { settings.world_aligned = !settings.world_aligned; },
+        [](auto& settings) { settings.radius += 0.5; },
+    };
+    for (Index i = 0; i < 3; ++i)
+      list.push_back([i](auto& settings) { settings.weights[i] += 0.5; });
+    return list;
+  }
+};
+
+using Kinds = std::tuple<Contact6D, ContactPoint>;
 
 /// The wrench of forces about a point, by force and lever, without any matrix of six rows.
 Vector6 wrenchByLevers(const SE3& oMs, const VectorXd& lambda, const Vector3d& about) {
@@ -225,6 +268,53 @@ BOOST_AUTO_TEST_CASE(nothing_presses_without_a_positive_normal_force) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(kinds_without_a_limit_use_none_of_it) {
+  const auto check = [](const ContactBase& contact, bool friction, bool edges, bool yaw) {
+    BOOST_TEST(std::isnan(contact.getFrictionUsage()) == !friction);
+    BOOST_TEST(std::isnan(contact.getCoPMargin()) == !edges);
+    BOOST_TEST(std::isnan(contact.getYawUsage()) == !yaw);
+  };
+  SuctionCup cup;
+  cup.applyForce(Vector6::Ones());
+  check(cup, false, false, false);
+
+  // Of a point, there is friction; of a sole, all, as far as its settings are not zero.
+  const auto tip = point();
+  tip->setMu(0.5);
+  tip->applyForce(Vector3d::Ones());
+  check(*tip, true, false, false);
+  const auto foot = sole();
+  foot->applyForce(Vector6::Ones());
+  check(*foot, false, true, false);
+  foot->setMu(0.5);
+  check(*foot, true, true, false);
+  foot->setGu(0.5);
+  check(*foot, true, true, true);
+  check(Contact6D(), false, false, false);
+  check(ContactPoint(), false, false, false);
+}
+
+BOOST_AUTO_TEST_CASE(without_force_nothing_is_used) {
+  const auto tip = point();
+  const auto foot = sole();
+  for (const double mu : {0.5, 0.}) {
+    tip->setMu(mu);
+    foot->setMu(mu);
+    foot->setGu(mu);
+    BOOST_TEST(tip->getFrictionUsage() == 0.);
+    BOOST_TEST(foot->getFrictionUsage() == 0.);
+    BOOST_TEST(foot->getYawUsage() == 0.);
+    BOOST_TEST(std::isnan(foot->getCoPMargin()));
+  }
+  // A deactivated contact is back there.
+  foot->setMu(0.5);
+  foot->applyForce((Vector6() << 10., 0., 100., 0., 0., 0.).finished());
+  BOOST_TEST(foot->getFrictionUsage() > 0.);
+  foot->deactivate();
+  BOOST_TEST(foot->getFrictionUsage() == 0.);
+  BOOST_TEST(std::isnan(foot->getCoPMargin()));
+}
+
 BOOST_AUTO_TEST_CASE(clone_has_everything_and_shares_nothing) {
   Random random(9);
   for (const auto& contact : allKinds()) {
@@ -265,4 +355,55 @@ BOOST_AUTO_TEST_CASE(reset_forgets_frame_index_and_force) {
   cup.initialize();
   BOOST_TEST(cup.getFrameID() == +ContactBase::kUnknownFrame);
   BOOST_TEST(close(cup.appliedForce(), Vector6::Zero(), 0.));
+}
+
+BOOST_AUTO_TEST_CASE_TEMPLATE(settings_compare_and_print_by_every_field, Contact, Kinds) {
+  typename Kind<Contact>::Settings settings;
+  settings.frame_name = "tip";
+  const auto same = settings;
+  BOOST_TEST((settings == same));
+  BOOST_TEST(!(settings != same));
+  BOOST_TEST(settings.to_string() == same.to_string());
+  for (const auto& change : Kind<Contact>::changes()) {
+    auto other = settings;
+    change(other);
+    BOOST_TEST((settings != other));
+    BOOST_TEST(!(settings == other));
+    BOOST_TEST(settings.to_string() != other.to_string());
+  }
+}
+
+BOOST_AUTO_TEST_CASE_TEMPLATE(initialize_may_be_called_again, Contact, Kinds) {
+  typename Kind<Contact>::Settings settings;
+  settings.frame_name = "tip";
+  Contact contact;
+  for (const auto& change : Kind<Contact>::changes()) {
+    change(settings);
+    contact.initialize(settings);
+    BOOST_TEST((contact.getSettings() == settings));
+    BOOST_TEST(contact.getFrameName() == settings.frame_name);
+    const Contact fresh(settings);
+    BOOST_TEST(close(contact.uni_A(), fresh.uni_A(), 0.));
+    BOOST_TEST(close(contact.fri_A(), fresh.fri_A(), 0.));
+    BOOST_TEST(close(contact.reg_A(), fresh.reg_A(), 0.));
+    // What belonged to the settings before is forgotten.
+    BOOST_TEST(close(contact.appliedForce(), VectorXd::Zero(contact.cols()), 0.));
+    BOOST_TEST(contact.getFrameID() == +ContactBase::kUnknownFrame);
+    contact.applyForce(VectorXd::Ones(contact.cols()));
+    contact.setFrameID(4);
+  }
+}
+
+BOOST_AUTO_TEST_CASE_TEMPLATE(clone_has_settings_of_its_own, Contact, Kinds) {
+  typename Kind<Contact>::Settings settings;
+  settings.frame_name = "tip";
+  Contact contact(settings);
+  const auto copy = std::dynamic_pointer_cast<Contact>(contact.clone());
+  BOOST_REQUIRE(copy);
+  contact.setMu(0.5);
+  BOOST_TEST((copy->getSettings() == settings));
+  BOOST_TEST(close(copy->fri_A(), Contact(settings).fri_A(), 0.));
+
+  copy->setMu(3.);
+  BOOST_TEST(contact.getSettings().mu == 0.5);
 }

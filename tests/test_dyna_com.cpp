@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -25,6 +26,7 @@ using namespace dynacom_tests;
 namespace {
 
 const double kNaN = std::numeric_limits<double>::quiet_NaN();
+const double kInfinity = std::numeric_limits<double>::infinity();
 
 std::shared_ptr<Contact6D> makeSole(const std::string& frame, double mu = 0.7) {
   Contact6DSettings settings;
@@ -78,6 +80,28 @@ DistributionStatus distribute(DynaCoM& dynacom, const Vector6& wrench, const Vec
   return dynacom.distributeForce(wrench.head<3>(), wrench.tail<3>(), com);
 }
 
+/// What the contacts give, about the CoM that Pinocchio finds.
+Vector6 givenWrench(const DynaCoM& dynacom, const VectorXd& q) {
+  Vector6 sum = Vector6::Zero();
+  for (const auto& name : dynacom.getActiveContacts())
+    sum += dynacom.getContact(name)->toWorldForces();
+  sum.tail<3>() -= comOf(dynacom.getModel(), q).cross(Vector3d(sum.head<3>()));
+  return sum;
+}
+
+/// Newton and Euler: the accelerations (c̈, L̇) that a wrench of the ground causes, with another one.
+Vector6 accelerationsBy(const pinocchio::Model& model, const Vector6& ground,
+                        const Vector6& external) {
+  Vector6 accelerations = ground + external;
+  accelerations.head<3>() /= totalMass(model);
+  accelerations.head<3>() += model.gravity.linear();
+  return accelerations;
+}
+
+Vector6 feasibleAccelerations(const DynaCoM& dynacom) {
+  return (Vector6() << dynacom.getFeasibleACoM(), dynacom.getFeasibleAMVariation()).finished();
+}
+
 /// The external wrench with which the ground must give the one that is wanted.
 Vector6 externalFor(DynaCoM& dynacom, const State& x, const Vector6& wanted) {
   compute(dynacom, x);
@@ -127,7 +151,20 @@ View everythingSeen(const DynaCoM& dynacom) {
   see("CoP", dynacom.getCoP().transpose());
   see("VRP", dynacom.getVRP().transpose());
   see("NL", dynacom.getNL().transpose());
+  see("minimal vertical force", dynacom.getMinimalVerticalForce());
+  see("CoP is defined", dynacom.isCoPDefined());
+  see("feasible ACoM", dynacom.getFeasibleACoM().transpose());
+  see("feasible AM variation", dynacom.getFeasibleAMVariation().transpose());
+  see("wrench weights", dynacom.getWrenchWeights().transpose());
   see("status", dynacom.getDistributionStatus());
+  const DistributionResult& result = dynacom.getDistribution();
+  see("achieved", result.achieved.transpose());
+  see("residual", result.residual.transpose());
+  see("scale", result.scale);
+  see("cost", result.cost);
+  see("iterations", result.iterations);
+  see("forces of the distribution", result.forces().transpose());
+  see("multipliers", result.wrench_multipliers.transpose());
   see("forces", dynacom.allForces().transpose());
   see("ne_b", dynacom.ne_b().transpose());
   see("ne_A", dynacom.ne_A());
@@ -141,6 +178,10 @@ View everythingSeen(const DynaCoM& dynacom) {
     see("frame of " + name, contact.getFrameID());
     see("pose of " + name, contact.getPose());
     see("force of " + name, contact.appliedForce().transpose());
+    see("CoP of " + name, dynacom.getContactCoP(name).transpose());
+    see("CoP margin of " + name, dynacom.getContactCoPMargin(name));
+    see("friction usage of " + name, dynacom.getContactFrictionUsage(name));
+    see("yaw usage of " + name, dynacom.getContactYawUsage(name));
   }
   return view;
 }
@@ -153,6 +194,17 @@ boost::test_tools::predicate_result same(View one, View other) {
   for (const auto& [what, value] : one)
     if (other.count(what) == 0) result.message() << "\n" << what << ": " << value << " | nothing";
   return result;
+}
+
+/// Whether nothing at all is known of the motion.
+bool motionIsUnknown(const DynaCoM& dynacom) {
+  for (const auto& value :
+       {dynacom.getGroundCoMForce(), dynacom.getGroundCoMTorque(), dynacom.getCoM(),
+        dynacom.getVCoM(), dynacom.getACoM(), dynacom.getAM(), dynacom.getAMVariation(),
+        dynacom.getFeasibleACoM(), dynacom.getFeasibleAMVariation()})
+    if (!allNaN(value)) return false;
+  return allNaN(dynacom.getCoP()) && allNaN(dynacom.getVRP()) && allNaN(dynacom.getNL()) &&
+         !dynacom.isCoPDefined();
 }
 
 using Names = std::vector<std::string>;
@@ -228,20 +280,27 @@ BOOST_AUTO_TEST_CASE(vectors_may_be_columns_of_a_matrix) {
 }
 
 BOOST_AUTO_TEST_CASE(before_compute_dynamics_all_numbers_are_nan) {
-  const Biped biped(5);
-  const DynaCoM& dynacom = biped.dynacom;
-  BOOST_TEST(allNaN(dynacom.getGroundCoMForce()));
-  BOOST_TEST(allNaN(dynacom.getGroundCoMTorque()));
-  BOOST_TEST(allNaN(dynacom.getCoM()));
-  BOOST_TEST(allNaN(dynacom.getVCoM()));
-  BOOST_TEST(allNaN(dynacom.getACoM()));
-  BOOST_TEST(allNaN(dynacom.getAM()));
-  BOOST_TEST(allNaN(dynacom.getAMVariation()));
-  BOOST_TEST(allNaN(dynacom.getCoP()));
-  BOOST_TEST(allNaN(dynacom.getVRP()));
-  BOOST_TEST(allNaN(dynacom.getNL()));
-  BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::NoContact);
+  Biped biped(5);
+  DynaCoM& dynacom = biped.dynacom;
+  BOOST_TEST(motionIsUnknown(dynacom));
   BOOST_TEST(close(dynacom.getMass(), totalMass(biped.model)));
+  // Nor of a distribution.
+  const DistributionResult& result = dynacom.getDistribution();
+  BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::NoContact);
+  BOOST_TEST(result.status == DistributionStatus::NoContact);
+  for (const Vector6& value : {result.wrench, result.achieved, result.residual, dynacom.ne_b()})
+    BOOST_TEST(allNaN(value));
+  BOOST_TEST(std::isnan(result.cost));
+  BOOST_TEST(result.contacts.empty());
+  BOOST_TEST(!result.isOptimal());
+  BOOST_TEST(std::isnan(dynacom.computeWrenchMargin().margin));
+  // Nobody presses on anything yet.
+  for (const auto& name : dynacom.getActiveContacts()) {
+    BOOST_TEST(allNaN(dynacom.getContactCoP(name)));
+    BOOST_TEST(std::isnan(dynacom.getContactCoPMargin(name)));
+    BOOST_TEST(dynacom.getContactFrictionUsage(name) == 0.);
+    BOOST_TEST(dynacom.getContactYawUsage(name) == 0.);
+  }
 }
 
 // --- Centre of pressure, virtual repellent point, non-linearity --------------------------------
@@ -313,8 +372,8 @@ BOOST_AUTO_TEST_CASE(on_uneven_ground_pressure_is_the_mean_by_vertical_force) {
   // Different heights, and soles that tilt: equation (6) is not (5), but still the mean of where
   // the contacts press.
   Random random(13);
-  int solved = 0, different = 0;
-  for (int trial = 0; trial < 100; ++trial) {
+  int solved = 0, relaxed = 0, different = 0;
+  for (int trial = 0; trial < 200; ++trial) {
     std::vector<SE3> soles = stance(5);
     for (SE3& sole : soles) {
       sole.translation().z() = random.uniform(-1.1, -0.7);
@@ -343,21 +402,20 @@ BOOST_AUTO_TEST_CASE(on_uneven_ground_pressure_is_the_mean_by_vertical_force) {
     wanted.z() = random.uniform(300., 600.);
     const Vector6 external = externalFor(dynacom, x, wanted);
     compute(dynacom, x, external, false);
-    if (dynacom.getDistributionStatus() != DistributionStatus::Solved) {
-      BOOST_TEST(allNaN(dynacom.getCoP()));
-      continue;
-    }
-    ++solved;
-    // A contact without load has no centre of pressure; the next test is about those.
-    if (std::any_of(contacts.begin(), contacts.end(),
-                    [](const auto& contact) { return contact->appliedForce().z() < 1e-3; }))
-      continue;
+    // A contact without load has no centre of pressure.
+    contacts.erase(
+        std::remove_if(contacts.begin(), contacts.end(),
+                       [](const auto& contact) { return contact->appliedForce().z() < 1e-6; }),
+        contacts.end());
+    ++(dynacom.getDistributionStatus() == DistributionStatus::Solved ? solved : relaxed);
+    BOOST_TEST(dynacom.isCoPDefined());
     const Vector2d uneven = dynacom.getCoP();
-    BOOST_TEST(close(uneven, meanPressure(contacts), 1e-10));
+    BOOST_TEST(close(uneven, meanPressure(contacts), 1e-8));
     compute(dynacom, x, external, true);
     if ((uneven - dynacom.getCoP()).norm() > 1e-3) ++different;
   }
-  BOOST_TEST(solved > 50);
+  BOOST_TEST(solved > 40);
+  BOOST_TEST(relaxed > 5);
   BOOST_TEST(different > 25);
 }
 
@@ -386,40 +444,147 @@ BOOST_AUTO_TEST_CASE(contacts_without_load_press_nowhere) {
 }
 
 BOOST_AUTO_TEST_CASE(without_vertical_force_there_is_no_centre_of_pressure) {
+  // Nor what was there before, nor an infinity.
   Biped biped(14);
+  DynaCoM& dynacom = biped.dynacom;
   const State x = biped.moving();
   for (const bool flat : {true, false}) {
     for (const double fz : {0.9, 0., -100.}) {
+      compute(dynacom, restState(biped.model), Vector6::Zero(), flat);
+      dynacom.computeNL(3.);
+      BOOST_TEST(dynacom.isCoPDefined());
+      BOOST_TEST(dynacom.getNL().allFinite());
+
       Vector6 wanted = Vector6::Zero();
       wanted.z() = fz;
-      compute(biped.dynacom, x, externalFor(biped.dynacom, x, wanted), flat);
-      BOOST_TEST(allNaN(biped.dynacom.getCoP()));
+      compute(dynacom, x, externalFor(dynacom, x, wanted), flat);
+      dynacom.computeNL(3.);
+      BOOST_TEST(!dynacom.isCoPDefined());
+      BOOST_TEST(allNaN(dynacom.getCoP()));
+      BOOST_TEST(dynacom.getVRP().allFinite());
+      BOOST_TEST(allNaN(dynacom.getNL()));
     }
   }
 }
 
-BOOST_AUTO_TEST_CASE(on_uneven_ground_pressure_needs_a_distribution) {
+BOOST_AUTO_TEST_CASE(how_much_vertical_force_it_takes_is_a_setting) {
   Biped biped(15);
-  const State x = biped.moving();
-  // Out of reach: no soles lie that far out.
-  Vector6 wanted = Vector6::Zero();
-  wanted.z() = 500.;
-  wanted[3] = 500.;
-  const Vector6 external = externalFor(biped.dynacom, x, wanted);
-  compute(biped.dynacom, x, external, false);
-  BOOST_TEST(biped.dynacom.getDistributionStatus() == DistributionStatus::Infeasible);
-  BOOST_TEST(allNaN(biped.dynacom.getCoP()));
-  BOOST_TEST(close(biped.dynacom.allForces(), VectorXd::Zero(12), 0.));
-  compute(biped.dynacom, x, external, true);
-  BOOST_TEST(biped.dynacom.getCoP().allFinite());
+  DynaCoM& dynacom = biped.dynacom;
+  BOOST_TEST(dynacom.getMinimalVerticalForce() == 1.);
+  const State x = restState(biped.model);
+  compute(dynacom, x);
+  const double fz = dynacom.getGroundCoMForce().z();
+  for (const bool flat : {true, false}) {
+    // Where forces are summed, the last digits are not known.
+    const double margin = flat ? 0. : 1e-9 * fz;
+    const double below = std::nextafter(fz - margin, 0.);
+    const double above = std::nextafter(fz + margin, kInfinity);
+    for (const double threshold : {below, flat ? fz : below}) {
+      dynacom.setMinimalVerticalForce(threshold);
+      BOOST_TEST(dynacom.getMinimalVerticalForce() == threshold);
+      compute(dynacom, x, Vector6::Zero(), flat);
+      BOOST_TEST(dynacom.isCoPDefined());
+      BOOST_TEST(close(dynacom.getCoP(), dynacom.getCoM().head<2>(), 1e-8));
+    }
+    dynacom.setMinimalVerticalForce(above);
+    compute(dynacom, x, Vector6::Zero(), flat);
+    BOOST_TEST(!dynacom.isCoPDefined());
+    BOOST_TEST(allNaN(dynacom.getCoP()));
+  }
+}
 
-  biped.dynacom.deactivateContact("left");
-  biped.dynacom.deactivateContact("right");
-  compute(biped.dynacom, x, Vector6::Zero(), false);
-  BOOST_TEST(biped.dynacom.getDistributionStatus() == DistributionStatus::NoContact);
-  BOOST_TEST(allNaN(biped.dynacom.getCoP()));
-  compute(biped.dynacom, x, Vector6::Zero(), true);
-  BOOST_TEST(biped.dynacom.getCoP().allFinite());
+BOOST_AUTO_TEST_CASE(how_much_normal_force_it_takes_is_the_same_setting) {
+  Biped biped(16);
+  DynaCoM& dynacom = biped.dynacom;
+  const State x = restState(biped.model);
+  compute(dynacom, x, (Vector6() << -20., 10., 0., 0., 0., 1.).finished(), false);
+  BOOST_REQUIRE(dynacom.getDistributionStatus() == DistributionStatus::Solved);
+  for (const auto& [name, contact] : {std::pair{"left", biped.left}, {"right", biped.right}}) {
+    const double fz = contact->appliedForce()[2];
+    BOOST_REQUIRE(fz > 1.);
+    dynacom.setMinimalVerticalForce(fz);
+    BOOST_TEST(dynacom.getContactCoP(name).allFinite());
+    BOOST_TEST(dynacom.getContactCoPMargin(name) > 0.);
+    BOOST_TEST(dynacom.getContactFrictionUsage(name) > 0.);
+    BOOST_TEST(dynacom.getContactYawUsage(name) > 0.);
+    dynacom.setMinimalVerticalForce(std::nextafter(fz, kInfinity));
+    BOOST_TEST(allNaN(dynacom.getContactCoP(name)));
+    BOOST_TEST(std::isnan(dynacom.getContactCoPMargin(name)));
+    BOOST_TEST(dynacom.getContactFrictionUsage(name) == 0.);
+    BOOST_TEST(dynacom.getContactYawUsage(name) == 0.);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_centre_of_pressure_is_never_infinite) {
+  // Without gravity, and at rest, the ground wrench is exactly what is not external.
+  auto model = singleBody(1e-3, stance(2));
+  model.gravity.setZero();
+  DynaCoM dynacom(model);
+  dynacom.addContact(makeSole("sole0"), "left");
+  dynacom.addContact(makeSole("sole1"), "right");
+  for (const double minimum : {1e-320, 1e-300, 1e-3}) {
+    dynacom.setMinimalVerticalForce(minimum);
+    for (const double fz : {0., 1e-320, 1e-310, 1e-300, 1e-200, 1e-6, 1e3}) {
+      for (const double moment : {0., 1e-310, 1., 1e300}) {
+        for (const bool flat : {true, false}) {
+          const Vector6 wanted = (Vector6() << 0., 0., fz, moment, 0., 0.).finished();
+          compute(dynacom, restState(model), -wanted, flat);
+          if (dynacom.isCoPDefined())
+            BOOST_TEST(dynacom.getCoP().allFinite());
+          else
+            BOOST_TEST(allNaN(dynacom.getCoP()));
+          distribute(dynacom);
+          for (const char* name : {"left", "right"}) {
+            const Vector2d cop = dynacom.getContactCoP(name);
+            BOOST_TEST((cop.allFinite() || allNaN(cop)));
+            BOOST_TEST(std::isfinite(dynacom.getContactFrictionUsage(name)));
+            BOOST_TEST(std::isfinite(dynacom.getContactYawUsage(name)));
+          }
+        }
+      }
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(out_of_reach_pressure_is_that_of_what_is_achieved) {
+  // The ground should give the weight half a metre beside the outer edge of the left sole.
+  const auto model = singleBody(50., stance(2));
+  DynaCoM dynacom(model);
+  const std::shared_ptr<ContactBase> left = makeSole("sole0"), right = makeSole("sole1");
+  dynacom.addContact(left, "left");
+  dynacom.addContact(right, "right");
+  const State x = restState(model);
+  const double weight = 500., edge = 0.15 + 0.06, wantedY = edge + 0.5;
+  Vector6 wanted;
+  wanted << 0., 0., weight, wantedY * weight, 0., 0.;
+  const Vector6 external = externalFor(dynacom, x, wanted);
+  compute(dynacom, x, external, true);
+  BOOST_TEST(close(dynacom.getCoP(), Vector2d(0., wantedY)));
+  compute(dynacom, x, external, false);
+  BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::Relaxed);
+  BOOST_TEST(std::abs(right->appliedForce().z()) < 1e-6 * weight);
+  BOOST_TEST(close(dynacom.getCoP(), Vector2d(0., edge), 1e-8));
+  BOOST_TEST(close(dynacom.getCoP(), meanPressure({left}), 1e-8));
+
+  // Who can give nothing presses nowhere.
+  wanted << 0., 0., -weight, 0., 0., 0.;
+  compute(dynacom, x, externalFor(dynacom, x, wanted), false);
+  BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::Relaxed);
+  BOOST_TEST(allNaN(dynacom.getCoP()));
+}
+
+BOOST_AUTO_TEST_CASE(minimal_vertical_force_must_be_positive) {
+  Biped biped(17);
+  biped.dynacom.setMinimalVerticalForce(2.5);
+  for (const auto& [bad, text] : {std::pair<double, const char*>(0., "0"),
+                                  {-0.25, "-0.25"},
+                                  {kNaN, "nan"},
+                                  {kInfinity, "inf"},
+                                  {-kInfinity, "-inf"}})
+    BOOST_TEST(
+        throws<std::invalid_argument>([&, f = bad] { biped.dynacom.setMinimalVerticalForce(f); },
+                                      {"minimalVerticalForce", text}));
+  BOOST_TEST(biped.dynacom.getMinimalVerticalForce() == 2.5);
 }
 
 BOOST_AUTO_TEST_CASE(virtual_repellent_point_and_non_linearity_by_hand) {
@@ -451,6 +616,145 @@ BOOST_AUTO_TEST_CASE(non_linearity_with_a_state_computes_its_dynamics) {
   one.dynacom.computeNL(3.);
   other.dynacom.computeNL(3., x.q, x.v, x.a);
   BOOST_TEST(same(everythingSeen(one.dynacom), everythingSeen(other.dynacom)));
+}
+
+BOOST_AUTO_TEST_CASE(the_virtual_repellent_point_is_of_the_motion_that_presses) {
+  Biped biped(19);
+  DynaCoM& dynacom = biped.dynacom;
+  const double omega = 3.5;
+  const auto vrpBy = [&](const State& x, const Vector3d& acom) -> Vector2d {
+    return (comOf(biped.model, x.q) - acom / (omega * omega)).head<2>();
+  };
+  int relaxed = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    const State x = biped.moving();
+    const Vector6 external = biped.random.vector(6, 60.);
+    const Vector3d acom =
+        accelerationsBy(biped.model, rootWrench(biped.model, x), Vector6::Zero()).head<3>();
+    dynacom.computeNL(omega, x.q, x.v, x.a, external, true);
+    BOOST_TEST(close(dynacom.getVRP(), vrpBy(x, acom), 1e-10));
+    // A distribution does not change what flat ground has to give.
+    distribute(dynacom);
+    dynacom.computeNL(omega);
+    BOOST_TEST(close(dynacom.getVRP(), vrpBy(x, acom), 1e-10));
+
+    dynacom.computeNL(omega, x.q, x.v, x.a, external, false);
+    if (dynacom.getDistributionStatus() == DistributionStatus::Relaxed) ++relaxed;
+    const Vector6 feasible = accelerationsBy(biped.model, givenWrench(dynacom, x.q), external);
+    BOOST_TEST(close(dynacom.getVRP(), vrpBy(x, feasible.head<3>()), 1e-9));
+    if (!dynacom.isCoPDefined()) continue;
+    BOOST_TEST(close(dynacom.getNL(), dynacom.getCoP() - dynacom.getVRP()));
+  }
+  BOOST_TEST(relaxed > 5);
+  BOOST_TEST(relaxed < 20);
+}
+
+// --- What the contacts can cause ---------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(feasible_accelerations_are_those_that_the_forces_cause) {
+  int solved = 0, relaxed = 0;
+  for (unsigned seed = 80; seed < 100; ++seed) {
+    Biped biped(seed);
+    DynaCoM& dynacom = biped.dynacom;
+    for (const bool flat : {true, false}) {
+      for (const double size : {2., 200.}) {
+        const State x = biped.moving();
+        const Vector6 external = biped.random.vector(6, size);
+        compute(dynacom, x, external, flat);
+        if (flat) {
+          // Nobody has asked the contacts yet, although there was a distribution before.
+          BOOST_TEST(allNaN(feasibleAccelerations(dynacom)));
+          distribute(dynacom);
+        }
+        const Vector6 feasible = feasibleAccelerations(dynacom);
+        BOOST_TEST(close(feasible,
+                         accelerationsBy(biped.model, givenWrench(dynacom, x.q), external), 1e-9));
+        const Vector6 wanted =
+            accelerationsBy(biped.model, rootWrench(biped.model, x), Vector6::Zero());
+        if (dynacom.getDistributionStatus() == DistributionStatus::Solved) {
+          ++solved;
+          BOOST_TEST(close(feasible, wanted, 1e-7));
+        } else {
+          ++relaxed;
+          BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::Relaxed);
+          BOOST_TEST(!close(feasible, wanted, 1e-7));
+        }
+        // The motion that was asked for is what it was.
+        BOOST_TEST(close(dynacom.getACoM(), wanted.head<3>(), 1e-10));
+        BOOST_TEST(close(dynacom.getAMVariation(), wanted.tail<3>(), 1e-10));
+      }
+    }
+  }
+  BOOST_TEST(solved > 20);
+  BOOST_TEST(relaxed > 20);
+}
+
+BOOST_AUTO_TEST_CASE(feasible_accelerations_are_of_the_last_distribution) {
+  Biped biped(100);
+  DynaCoM& dynacom = biped.dynacom;
+  const State x = restState(biped.model);
+  const Vector6 external = biped.random.vector(6, 5.);
+  compute(dynacom, x, external, false);
+  const Vector6 other = (Vector6() << 10., 0., 150., 0., 0., 0.).finished();
+  distribute(dynacom, other, dynacom.getCoM());
+  BOOST_TEST(close(feasibleAccelerations(dynacom),
+                   accelerationsBy(biped.model, givenWrench(dynacom, x.q), external), 1e-9));
+}
+
+BOOST_AUTO_TEST_CASE(in_flight_only_gravity_and_what_is_external_accelerate) {
+  Biped biped(101);
+  DynaCoM& dynacom = biped.dynacom;
+  dynacom.deactivateContact("left");
+  dynacom.deactivateContact("right");
+  for (const bool flat : {true, false}) {
+    const State x = biped.moving();
+    const Vector6 external = biped.random.vector(6, 50.);
+    dynacom.computeNL(3., x.q, x.v, x.a, external, flat);
+    if (flat) BOOST_TEST(distribute(dynacom) == DistributionStatus::NoContact);
+    BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::NoContact);
+    const Vector6 expected = accelerationsBy(biped.model, Vector6::Zero(), external);
+    BOOST_TEST(close(feasibleAccelerations(dynacom), expected));
+    BOOST_TEST(dynacom.allForces().size() == 0);
+    BOOST_TEST(close(dynacom.getDistribution().achieved, Vector6::Zero(), 0.));
+    BOOST_TEST(close(dynacom.getDistribution().residual, groundWrench(dynacom), 0.));
+    // Equation (5) would know of ground; contacts that are none do not press.
+    BOOST_TEST(dynacom.isCoPDefined() == flat);
+    if (flat) continue;
+    BOOST_TEST(allNaN(dynacom.getCoP()));
+    BOOST_TEST(allNaN(dynacom.getNL()));
+    const Vector2d vrp = (comOf(biped.model, x.q) - Vector3d(expected.head<3>()) / 9.).head<2>();
+    BOOST_TEST(close(dynacom.getVRP(), vrp));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_free_fall_asks_the_ground_for_nothing) {
+  // What is left of the ground wrench is rounding, which neither contacts nor their absence mind.
+  const auto model = singleBody(50., stance(2));
+  for (const bool inContact : {true, false}) {
+    DynaCoM dynacom(model);
+    if (inContact) {
+      dynacom.addContact(makeSole("sole0"), "left");
+      dynacom.addContact(makePoint("sole1"), "right");
+    }
+    Random random(102);
+    for (int trial = 0; trial < 20; ++trial) {
+      State x = randomState(model, random);
+      x.v.setZero();
+      x.a.setZero();
+      // In the body's axes.
+      x.a.head<3>() =
+          framePlacement(model, x.q, "sole0").rotation().transpose() * model.gravity.linear();
+      dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
+      BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::Solved);
+      BOOST_TEST(close(dynacom.allForces(), VectorXd::Zero(inContact ? 9 : 0), 1e-9));
+      BOOST_TEST(close(dynacom.getFeasibleACoM(), model.gravity.linear(), 1e-10));
+      BOOST_TEST(close(dynacom.getFeasibleAMVariation(), Vector3d::Zero(), 1e-10));
+      BOOST_TEST(!dynacom.isCoPDefined());
+      BOOST_TEST(allNaN(dynacom.getNL()));
+      compute(dynacom, x);
+      BOOST_TEST(!dynacom.isCoPDefined());
+    }
+  }
 }
 
 // --- Distribution ------------------------------------------------------------------------------
@@ -495,42 +799,574 @@ BOOST_AUTO_TEST_CASE(forces_sum_to_the_ground_wrench_within_the_cones) {
   BOOST_TEST(solved > 25);
 }
 
-BOOST_AUTO_TEST_CASE(out_of_reach_all_forces_are_zero) {
-  Biped biped(21);
-  compute(biped.dynacom, restState(biped.model));
-  BOOST_TEST(distribute(biped.dynacom) == DistributionStatus::Solved);
-  BOOST_TEST(biped.left->appliedForce().norm() > 1.);
+BOOST_AUTO_TEST_CASE(out_of_reach_forces_are_the_closest_by_hand) {
+  // A point at the CoM gives no moment, and no force outside its pyramid: the closest to one that
+  // is beyond is on the edge (μ, 0, 1), where the weighted difference is orthogonal to it.
+  const double mu = 0.5;
+  const auto model = singleBody(10., {SE3::Identity()});
+  DynaCoM dynacom(model);
+  const auto point = makePoint("sole0", mu);
+  dynacom.addContact(point, "point");
+  compute(dynacom, restState(model));
+  const Vector6 wrench = (Vector6() << 200., 0., 100., 5., 0., -3.).finished();
+  for (const auto& weights :
+       {Vector6(Vector6::Ones()), (Vector6() << 3., 1., 0.5, 2., 1., 4.).finished()}) {
+    dynacom.setWrenchWeights(weights);
+    BOOST_TEST(close(dynacom.getWrenchWeights(), weights, 0.));
+    BOOST_TEST(distribute(dynacom, wrench, Vector3d::Zero()) == DistributionStatus::Relaxed);
+    const double x = weights[0] * weights[0], z = weights[2] * weights[2];
+    const double fz = (x * mu * wrench[0] + z * wrench[2]) / (x * mu * mu + z);
+    const Vector3d force(mu * fz, 0., fz);
+    BOOST_TEST(close(point->appliedForce(), force, 1e-9));
 
-  Vector6 wrench = groundWrench(biped.dynacom);
-  wrench.z() *= -1.;
-  const auto status = distribute(biped.dynacom, wrench, biped.dynacom.getCoM());
-  BOOST_TEST(status == DistributionStatus::Infeasible);
-  BOOST_TEST(biped.dynacom.getDistributionStatus() == DistributionStatus::Infeasible);
-  BOOST_TEST(close(biped.dynacom.ne_b(), wrench, 0.));
-  BOOST_TEST(close(biped.left->appliedForce(), Vector6::Zero(), 0.));
-  BOOST_TEST(close(biped.right->appliedForce(), Vector6::Zero(), 0.));
+    const DistributionResult& result = dynacom.getDistribution();
+    Vector6 achieved = Vector6::Zero();
+    achieved.head<3>() = force;
+    BOOST_TEST(result.status == DistributionStatus::Relaxed);
+    BOOST_TEST(close(result.wrench, wrench, 0.));
+    BOOST_TEST(close(result.achieved, achieved, 1e-9));
+    BOOST_TEST(close(result.residual, wrench - achieved, 1e-9));
+    BOOST_TEST(close(result.cost, 0.5 * force.squaredNorm(), 1e-9));
+    BOOST_TEST(close(result.wrench_weights, weights, 0.));
+    BOOST_TEST(result.isOptimal(1e-9));
+  }
+
+  // A pull is answered with nothing.
+  const Vector6 pull = (Vector6() << 0., 0., -100., 0., 0., 0.).finished();
+  BOOST_TEST(distribute(dynacom, pull, Vector3d::Zero()) == DistributionStatus::Relaxed);
+  BOOST_TEST(close(point->appliedForce(), Vector3d::Zero(), 1e-9));
+  BOOST_TEST(close(dynacom.getDistribution().residual, pull, 1e-9));
 }
 
-BOOST_AUTO_TEST_CASE(numbers_that_are_not_finite_are_a_status_not_an_exception) {
+BOOST_AUTO_TEST_CASE(the_distribution_tells_all_that_the_contacts_do) {
+  Random random(21);
+  int solved = 0, relaxed = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    const auto model = standingRobot(random, stance(4));
+    DynaCoM dynacom(model);
+    dynacom.addContact(makePoint("sole3"), "b");
+    dynacom.addContact(makeSole("sole0"), "idle", false);
+    dynacom.addContact(makeSole("sole1"), "a");
+    dynacom.addContact(makePoint("sole2"), "c");
+    const State x = randomState(model, random, 0.05);
+    compute(dynacom, x, random.vector(6, trial % 2 == 0 ? 5. : 200.));
+    const auto status = distribute(dynacom);
+    ++(status == DistributionStatus::Solved ? solved : relaxed);
+    const DistributionResult& result = dynacom.getDistribution();
+    BOOST_TEST(result.status == status);
+    BOOST_TEST(close(result.wrench, groundWrench(dynacom), 0.));
+    BOOST_TEST(close(result.achieved, givenWrench(dynacom, x.q), 1e-10));
+    BOOST_TEST(close(result.residual, groundWrench(dynacom) - givenWrench(dynacom, x.q), 1e-10));
+    BOOST_TEST(close(result.forces(), dynacom.allForces(), 0.));
+    BOOST_TEST(close(result.cost, 0.5 * dynacom.allForces().squaredNorm()));
+    BOOST_TEST(
+        result.scale == std::max(groundWrench(dynacom).stableNorm(), totalMass(model) * 9.81),
+        boost::test_tools::tolerance(1e-12));
+    BOOST_TEST(result.isOptimal(1e-8));
+    const Names active = dynacom.getActiveContacts();
+    BOOST_REQUIRE(result.contacts.size() == 3u);
+    BOOST_REQUIRE((active == Names{"b", "a", "c"}));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const ContactBase& contact = *dynacom.getContact(active[k]);
+      const VectorXd& force = contact.appliedForce();
+      BOOST_TEST(close(result.contacts[k].force, force, 0.));
+      BOOST_TEST(close(result.contacts[k].NE, contact.ne_A(), 0.));
+      BOOST_TEST(close(result.contacts[k].weights, contact.reg_A(), 0.));
+      // Inside the cone, whatever the status.
+      const double tolerance = 1e-9 * result.scale;
+      BOOST_TEST((contact.uni_A() * force).maxCoeff() <= tolerance);
+      BOOST_TEST((contact.fri_A() * force).maxCoeff() <= tolerance);
+    }
+    BOOST_TEST(close(dynacom.getContact("idle")->appliedForce(), Vector6::Zero(), 0.));
+  }
+  BOOST_TEST(solved > 10);
+  BOOST_TEST(relaxed > 10);
+}
+
+BOOST_AUTO_TEST_CASE(the_distribution_is_that_of_a_wrench_distribution) {
   Biped biped(22);
-  State x = restState(biped.model);
-  x.a[0] = kNaN;
-  compute(biped.dynacom, x, Vector6::Zero(), false);
-  BOOST_TEST(biped.dynacom.getDistributionStatus() == DistributionStatus::NumericalFailure);
-  BOOST_TEST(allNaN(biped.dynacom.getCoP()));
-  BOOST_TEST(close(biped.dynacom.allForces(), VectorXd::Zero(12), 0.));
-
-  x = restState(biped.model);
-  x.q[0] = kNaN;
-  compute(biped.dynacom, x);
-  BOOST_TEST(distribute(biped.dynacom) == DistributionStatus::NumericalFailure);
-  BOOST_TEST(close(biped.dynacom.allForces(), VectorXd::Zero(12), 0.));
-
-  // Sensors recover, and so does it.
-  compute(biped.dynacom, restState(biped.model));
-  BOOST_TEST(distribute(biped.dynacom) == DistributionStatus::Solved);
-  BOOST_TEST(biped.dynacom.getCoP().allFinite());
+  DynaCoM& dynacom = biped.dynacom;
+  dynacom.setWrenchWeights((Vector6() << 1., 2., 3., 4., 5., 6.).finished());
+  for (const double size : {2., 200.}) {
+    compute(dynacom, biped.moving(), biped.random.vector(6, size), false);
+    WrenchDistribution distribution;
+    distribution.setWrenchWeights(dynacom.getWrenchWeights());
+    distribution.add(*biped.left);
+    distribution.add(*biped.right);
+    const auto status = distribution.solve(groundWrench(dynacom), totalMass(biped.model) * 9.81);
+    BOOST_TEST(status == dynacom.getDistributionStatus());
+    BOOST_TEST(close(dynacom.allForces(), distribution.result().forces(), 0.));
+  }
 }
+
+BOOST_AUTO_TEST_CASE(the_distribution_is_the_last_one_whatever_has_changed_since) {
+  using Change = std::function<void(Biped&)>;
+  for (const auto& change :
+       {Change([](Biped& biped) { biped.dynacom.addContact(makePoint("sole0"), "new"); }),
+        Change([](Biped& biped) { biped.dynacom.removeContact("left"); }),
+        Change([](Biped& biped) { biped.dynacom.deactivateContact("left"); }),
+        Change([](Biped& biped) { biped.dynacom.activateContact("idle"); }),
+        Change([](Biped& biped) { biped.left->setMu(0.1); }),
+        Change([](Biped& biped) { biped.dynacom.setWrenchWeights(Vector6::Constant(2.)); })}) {
+    Biped biped(23);
+    DynaCoM& dynacom = biped.dynacom;
+    dynacom.addContact(makePoint("sole1"), "idle", false);
+    compute(dynacom, restState(biped.model));
+    // Out of reach, where the weights matter.
+    const Vector6 wrench = (Vector6() << 500., 0., 300., 0., 0., 0.).finished();
+    BOOST_REQUIRE(distribute(dynacom, wrench, dynacom.getCoM()) == DistributionStatus::Relaxed);
+    const VectorXd forces = dynacom.allForces();
+    const Vector6 achieved = dynacom.getDistribution().achieved;
+    change(biped);
+    const DistributionResult& result = dynacom.getDistribution();
+    BOOST_TEST(result.status == DistributionStatus::Relaxed);
+    BOOST_TEST(result.contacts.size() == 2u);
+    BOOST_TEST(close(result.forces(), forces, 0.));
+    BOOST_TEST(close(result.wrench, wrench, 0.));
+    BOOST_TEST(close(result.achieved, achieved, 0.));
+    BOOST_TEST(close(result.wrench_weights, Vector6::Ones(), 0.));
+    BOOST_TEST(result.isOptimal());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(forces_are_the_same_far_from_the_origin) {
+  // All that differs is that the placements' digits are used up by the distance.
+  int relaxed = 0;
+  for (unsigned seed = 110; seed < 120; ++seed) {
+    Random random(seed);
+    const auto model = standingRobot(random, stance(4));
+    DynaCoM dynacom(model);
+    dynacom.addContact(makeSole("sole0"), "sole");
+    for (const char* frame : {"sole1", "sole2", "sole3"})
+      dynacom.addContact(makePoint(frame), frame);
+    for (const double size : {2., 200.}) {
+      State x = randomState(model, random, 0.05);
+      const Vector6 external = random.vector(6, size);
+      compute(dynacom, x, external, false);
+      const auto status = dynacom.getDistributionStatus();
+      if (status == DistributionStatus::Relaxed) ++relaxed;
+      const VectorXd forces = dynacom.allForces();
+      const Vector2d cop = dynacom.getCoP();
+      const Vector3d away = 100. * random.rotation().col(0);
+      x.q.head<3>() += away;
+      dynacom.setGroundHeight(away.z());
+      compute(dynacom, x, external, false);
+      BOOST_TEST(dynacom.getDistributionStatus() == status);
+      BOOST_TEST((dynacom.allForces() - forces).norm() <= 1e-7 * forces.norm());
+      if (dynacom.isCoPDefined()) BOOST_TEST(close(dynacom.getCoP() - away.head<2>(), cop, 1e-7));
+    }
+  }
+  BOOST_TEST(relaxed > 5);
+}
+
+BOOST_AUTO_TEST_CASE(wrench_weights_must_be_positive) {
+  Biped biped(24);
+  BOOST_TEST(close(biped.dynacom.getWrenchWeights(), Vector6::Ones(), 0.));
+  const Vector6 good = (Vector6() << 1., 2., 3., 4., 5., 6.).finished();
+  biped.dynacom.setWrenchWeights(good);
+  for (Index i = 0; i < 6; ++i) {
+    for (const auto& [bad, text] : {std::pair<double, const char*>(0., "0"),
+                                    {-0.25, "-0.25"},
+                                    {kNaN, "nan"},
+                                    {kInfinity, "inf"}}) {
+      Vector6 weights = good;
+      weights[i] = bad;
+      BOOST_TEST(throws<std::invalid_argument>([&] { biped.dynacom.setWrenchWeights(weights); },
+                                               {"weights", text}));
+      BOOST_TEST(close(biped.dynacom.getWrenchWeights(), good, 0.));
+    }
+  }
+}
+
+// --- How close to the edge ---------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(usages_and_margins_by_hand) {
+  // A sole alone gives what it is asked for, if it can: its force is the wrench about its centre.
+  const auto model = singleBody(50., stance(2));
+  DynaCoM dynacom(model);
+  dynacom.addContact(makeSole("sole0"), "sole");
+  dynacom.addContact(makePoint("sole1"), "idle", false);
+  compute(dynacom, restState(model));
+  const Vector3d centre(0., 0.15, 0.);
+  const Vector6 force = (Vector6() << 35., -70., 200., -4., 10., 5.).finished();
+  BOOST_TEST(distribute(dynacom, force, centre) == DistributionStatus::Solved);
+  BOOST_TEST(close(dynacom.getContactFrictionUsage("sole"), 70. / (0.7 * 200.), 1e-9));
+  BOOST_TEST(close(dynacom.getContactCoP("sole"), Vector2d(-10. / 200., -4. / 200.), 1e-9));
+  // 5 cm to the front or back edge, 4 cm to one side.
+  BOOST_TEST(close(dynacom.getContactCoPMargin("sole"), 0.04, 1e-9));
+  BOOST_TEST(close(dynacom.getContactYawUsage("sole"), 5. / (0.1 * 200.), 1e-9));
+
+  // On all edges at once, beyond which it cannot go.
+  for (const double beyond : {1., 2.}) {
+    const Vector6 edge =
+        (Vector6() << 140. * beyond, 0., 200., 0., 20. * beyond, -20. * beyond).finished();
+    BOOST_TEST(distribute(dynacom, edge, centre) ==
+               (beyond > 1. ? DistributionStatus::Relaxed : DistributionStatus::Solved));
+    BOOST_TEST(close(dynacom.getContactFrictionUsage("sole"), 1., 1e-8));
+    BOOST_TEST(close(dynacom.getContactCoPMargin("sole"), 0., 1e-8));
+    BOOST_TEST(close(dynacom.getContactYawUsage("sole"), 1., 1e-8));
+  }
+
+  // Who takes no part uses nothing.
+  const auto expectNothing = [&](const std::string& name) {
+    BOOST_TEST(dynacom.getContactFrictionUsage(name) == 0.);
+    BOOST_TEST(allNaN(dynacom.getContactCoP(name)));
+    BOOST_TEST(std::isnan(dynacom.getContactCoPMargin(name)));
+  };
+  expectNothing("idle");
+  dynacom.deactivateContact("sole");
+  expectNothing("sole");
+  BOOST_TEST(dynacom.getContactYawUsage("sole") == 0.);
+
+  // A point has friction, but neither edges nor yaw.
+  dynacom.activateContact("idle");
+  const Vector6 push = (Vector6() << 35., -70., 200., 0., 0., 0.).finished();
+  BOOST_TEST(distribute(dynacom, push, -centre) == DistributionStatus::Solved);
+  BOOST_TEST(close(dynacom.getContactFrictionUsage("idle"), 0.5, 1e-9));
+  BOOST_TEST(close(dynacom.getContactCoP("idle"), Vector2d::Zero(), 0.));
+  BOOST_TEST(std::isnan(dynacom.getContactCoPMargin("idle")));
+  BOOST_TEST(std::isnan(dynacom.getContactYawUsage("idle")));
+}
+
+BOOST_AUTO_TEST_CASE(the_wrench_margin_by_hand) {
+  // A sole at the CoM: each component has its own bound. The moment about x, which is bounded by
+  // ±0.06 m f_z, leans to one side.
+  const auto model = singleBody(50., {SE3::Identity()});
+  DynaCoM dynacom(model);
+  dynacom.addContact(makeSole("sole0"), "sole");
+  compute(dynacom, restState(model));
+  const double fz = 400.;
+  Vector6 wrench = (Vector6() << 0., 0., fz, 0.01 * fz, 0., 0.).finished();
+  const auto margin = [&] {
+    distribute(dynacom, wrench, Vector3d::Zero());
+    return dynacom.computeWrenchMargin();
+  };
+  WrenchMargin found = margin();
+  BOOST_TEST(close(found.margin, 0.05 * fz, 1e-6));
+  BOOST_TEST(found.axis == 3);
+  BOOST_TEST(found.sign == 1);
+  wrench[3] = -wrench[3];
+  found = margin();
+  BOOST_TEST(close(found.margin, 0.05 * fz, 1e-6));
+  BOOST_TEST(found.axis == 3);
+  BOOST_TEST(found.sign == -1);
+
+  // In newtons, by the weights: then friction gives way first.
+  dynacom.setWrenchWeights((Vector6() << 1., 1., 1., 20., 20., 20.).finished());
+  wrench << 0., 0.2 * fz, fz, 0., 0., 0.;
+  found = margin();
+  BOOST_TEST(close(found.margin, 0.5 * fz, 1e-6));
+  BOOST_TEST(found.axis == 1);
+  BOOST_TEST(found.sign == 1);
+
+  // Looking changes nothing.
+  const View before = everythingSeen(dynacom);
+  dynacom.computeWrenchMargin();
+  BOOST_TEST(same(everythingSeen(dynacom), before));
+
+  // On the boundary, beyond it, and where there is no answer.
+  wrench[1] = 0.7 * fz;
+  BOOST_TEST(close(margin().margin, 0., 1e-6));
+  wrench[1] = 2. * fz;
+  BOOST_TEST(margin().margin == 0.);
+  wrench[1] = kNaN;
+  found = margin();
+  BOOST_TEST(std::isnan(found.margin));
+  BOOST_TEST(found.axis == -1);
+  BOOST_TEST(found.sign == 0);
+}
+
+BOOST_AUTO_TEST_CASE(the_wrench_margin_of_points_and_of_opposite_walls) {
+  // One point cannot turn anything about itself, and two not about the line between them.
+  const auto points = singleBody(50., stance(2));
+  DynaCoM dynacom(points);
+  dynacom.addContact(makePoint("sole0"), "left");
+  dynacom.addContact(makePoint("sole1"), "right");
+  compute(dynacom, restState(points), Vector6::Zero(), false);
+  BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::Solved);
+  BOOST_TEST(close(dynacom.computeWrenchMargin().margin, 0., 1e-6));
+
+  // Palms that press against each other hold whatever one wants.
+  const auto wall = [](double side) {
+    return SE3(Eigen::AngleAxisd(side * M_PI / 2., Vector3d::UnitY()).toRotationMatrix(),
+               Vector3d(-side * 0.4, 0., 0.));
+  };
+  const auto palms = singleBody(50., {wall(1.), wall(-1.)});
+  DynaCoM held(palms);
+  held.addContact(makeSole("sole0"), "left");
+  held.addContact(makeSole("sole1"), "right");
+  for (const Vector3d& force : {Vector3d(0., 0., 500.), Vector3d(-300., 200., -500.)}) {
+    compute(held, restState(palms));
+    BOOST_TEST(held.distributeForce(force, Vector3d(5., -5., 5.), Vector3d::Zero()) ==
+               DistributionStatus::Solved);
+    const WrenchMargin margin = held.computeWrenchMargin();
+    BOOST_TEST(margin.margin == kInfinity);
+    BOOST_TEST(margin.axis == -1);
+    BOOST_TEST(margin.sign == 0);
+  }
+}
+
+// --- Numbers that are not finite ---------------------------------------------------------------
+
+namespace {
+
+const double kNotFinite[] = {kNaN, kInfinity, -kInfinity};
+
+/// A name for each number of a state and of an external wrench, and how to reach it.
+using Argument = std::pair<std::string, std::function<double&(State&, Vector6&)>>;
+
+std::vector<Argument> argumentsOf(const pinocchio::Model& model) {
+  std::vector<Argument> arguments;
+  const auto add = [&](const std::string& name, Index size, auto number) {
+    for (Index i = 0; i < size; ++i)
+      arguments.emplace_back(
+          name + "[" + std::to_string(i) + "]",
+          [=](State& x, Vector6& external) -> double& { return number(x, external, i); });
+  };
+  add("q", model.nq, [](State& x, Vector6&, Index i) -> double& { return x.q[i]; });
+  add("v", model.nv, [](State& x, Vector6&, Index i) -> double& { return x.v[i]; });
+  add("a", model.nv, [](State& x, Vector6&, Index i) -> double& { return x.a[i]; });
+  add("extWrench", 6, [](State&, Vector6& external, Index i) -> double& { return external[i]; });
+  return arguments;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(a_number_that_is_not_finite_leaves_nothing_known_of_the_motion) {
+  Biped biped(130);
+  DynaCoM& dynacom = biped.dynacom;
+  const State good = restState(biped.model);
+  dynacom.computeNL(3., good.q, good.v, good.a, Vector6::Zero(), false);
+  const View recovered = everythingSeen(dynacom);
+  const VectorXd forces = dynacom.allForces();
+  BOOST_REQUIRE(dynacom.getNL().allFinite());
+  for (const auto& [name, number] : argumentsOf(biped.model)) {
+    for (const double bad : kNotFinite) {
+      for (const bool flat : {true, false}) {
+        BOOST_TEST_CONTEXT(name << " = " << bad << (flat ? ", flat" : "")) {
+          State x = good;
+          Vector6 external = Vector6::Zero();
+          number(x, external) = bad;
+          compute(dynacom, x, external, flat);
+          BOOST_TEST(motionIsUnknown(dynacom));
+          dynacom.computeNL(3.);
+          BOOST_TEST(motionIsUnknown(dynacom));
+          dynacom.computeNL(3., x.q, x.v, x.a, external, flat);
+          BOOST_TEST(motionIsUnknown(dynacom));
+          if (flat) distribute(dynacom);
+          BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::InvalidInput);
+          BOOST_TEST(!dynacom.getDistribution().isOptimal());
+          BOOST_TEST(std::isnan(dynacom.computeWrenchMargin().margin));
+          BOOST_TEST(motionIsUnknown(dynacom));
+          // The last forces are better than none.
+          BOOST_TEST(close(dynacom.allForces(), forces, 0.));
+
+          dynacom.computeNL(3., good.q, good.v, good.a, Vector6::Zero(), false);
+          BOOST_TEST(same(everythingSeen(dynacom), recovered));
+        }
+      }
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_number_that_becomes_infinite_is_none_either) {
+  Biped biped(131);
+  DynaCoM& dynacom = biped.dynacom;
+  for (const bool flat : {true, false}) {
+    State x = biped.moving();
+    x.v *= 1e200;
+    dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), flat);
+    BOOST_TEST(motionIsUnknown(dynacom));
+    if (!flat) BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::InvalidInput);
+    compute(dynacom, restState(biped.model), Vector6::Zero(), flat);
+    BOOST_TEST(dynacom.isCoPDefined());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_distribution_of_numbers_that_are_not_finite_keeps_the_forces) {
+  Biped biped(132);
+  DynaCoM& dynacom = biped.dynacom;
+  compute(dynacom, restState(biped.model));
+  const Vector3d com = dynacom.getCoM();
+  const Vector6 wrench = groundWrench(dynacom);
+  BOOST_REQUIRE(distribute(dynacom) == DistributionStatus::Solved);
+  const View recovered = everythingSeen(dynacom);
+  const VectorXd forces = dynacom.allForces();
+  const auto expectKept = [&](DistributionStatus status) {
+    BOOST_TEST(status == DistributionStatus::InvalidInput);
+    BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::InvalidInput);
+    BOOST_TEST(dynacom.getDistribution().status == DistributionStatus::InvalidInput);
+    BOOST_TEST(!dynacom.getDistribution().isOptimal());
+    BOOST_TEST(close(dynacom.allForces(), forces, 0.));
+    BOOST_TEST(close(dynacom.getDistribution().forces(), forces, 0.));
+    BOOST_TEST(std::isnan(dynacom.computeWrenchMargin().margin));
+    // What the forces that are kept use is still known.
+    for (const char* name : {"left", "right"}) {
+      BOOST_TEST(dynacom.getContactCoP(name).allFinite());
+      BOOST_TEST(dynacom.getContactCoPMargin(name) > 0.);
+    }
+  };
+  for (Index i = 0; i < 9; ++i) {
+    for (const double bad : kNotFinite) {
+      BOOST_TEST_CONTEXT("argument " << i << " = " << bad) {
+        Eigen::Matrix<double, 9, 1> all;
+        all << wrench, com;
+        all[i] = bad;
+        expectKept(distribute(dynacom, all.head<6>(), all.tail<3>()));
+        // And again, although the last call had no answer.
+        expectKept(distribute(dynacom, all.head<6>(), all.tail<3>()));
+        BOOST_TEST(distribute(dynacom, wrench, com) == DistributionStatus::Solved);
+        BOOST_TEST(same(everythingSeen(dynacom), recovered));
+      }
+    }
+  }
+
+  // Also where the contacts are elsewhere meanwhile, which is not what a setting is.
+  compute(dynacom, biped.moving());
+  expectKept(distribute(dynacom, Vector6::Constant(kNaN), com));
+  // And where the frames are nowhere.
+  State x = restState(biped.model);
+  x.q[0] = kNaN;
+  compute(dynacom, x);
+  expectKept(distribute(dynacom, wrench, com));
+
+  // The same after a distribution out of reach.
+  compute(dynacom, restState(biped.model));
+  BOOST_REQUIRE(distribute(dynacom, 3. * Vector6::Ones() * wrench.z(), com) ==
+                DistributionStatus::Relaxed);
+  const VectorXd relaxed = dynacom.allForces();
+  BOOST_TEST(distribute(dynacom, wrench, Vector3d::Constant(kNaN)) ==
+             DistributionStatus::InvalidInput);
+  BOOST_TEST(close(dynacom.allForces(), relaxed, 0.));
+}
+
+BOOST_AUTO_TEST_CASE(forces_are_not_kept_when_contacts_or_settings_have_changed) {
+  using Change = std::function<void(Biped&)>;
+  const auto moveTo = [](Contact6D& contact, const char* frame) {
+    auto settings = contact.getSettings();
+    settings.frame_name = frame;
+    contact.initialize(settings);
+  };
+  const std::vector<std::pair<const char*, Change>> changes = {
+      {"add", [](Biped& biped) { biped.dynacom.addContact(makePoint("sole0"), "new"); }},
+      {"remove", [](Biped& biped) { biped.dynacom.removeContact("right"); }},
+      {"activate", [](Biped& biped) { biped.dynacom.activateContact("idle"); }},
+      {"deactivate", [](Biped& biped) { biped.dynacom.deactivateContact("right"); }},
+      {"deactivate and activate",
+       [](Biped& biped) {
+         biped.dynacom.deactivateContact("right");
+         biped.dynacom.activateContact("right");
+       }},
+      {"remove and add",
+       [](Biped& biped) {
+         biped.dynacom.removeContact("right");
+         biped.dynacom.addContact(biped.right, "right");
+       }},
+      {"another of the same settings",
+       [](Biped& biped) {
+         biped.dynacom.removeContact("right");
+         biped.dynacom.addContact(makeSole("sole1"), "right");
+       }},
+      {"setMu", [](Biped& biped) { biped.right->setMu(0.71); }},
+      {"setGu", [](Biped& biped) { biped.right->setGu(0.11); }},
+      {"setSurfaceHalfLength", [](Biped& biped) { biped.right->setSurfaceHalfLength(0.11); }},
+      {"setSurfaceHalfWidth", [](Biped& biped) { biped.right->setSurfaceHalfWidth(0.07); }},
+      {"setForceWeights", [](Biped& biped) { biped.right->setForceWeights(Vector3d(1., 1., 2.)); }},
+      {"setTorqueWeights",
+       [](Biped& biped) { biped.right->setTorqueWeights(Vector3d(1., 1., 2.)); }},
+      {"setWrenchWeights",
+       [](Biped& biped) { biped.dynacom.setWrenchWeights(Vector6::Constant(2.)); }},
+      {"another frame", [&](Biped& biped) { moveTo(*biped.right, "sole0"); }},
+      {"initialized again", [&](Biped& biped) { moveTo(*biped.right, "sole1"); }},
+  };
+  for (const auto& [what, change] : changes) {
+    for (const bool byDynamics : {true, false}) {
+      BOOST_TEST_CONTEXT(what) {
+        Biped biped(133);
+        DynaCoM& dynacom = biped.dynacom;
+        dynacom.addContact(makePoint("sole0"), "idle", false);
+        const State x = restState(biped.model);
+        State bad = x;
+        bad.a[0] = kNaN;
+        compute(dynacom, x);
+        BOOST_REQUIRE(distribute(dynacom) == DistributionStatus::Solved);
+        BOOST_REQUIRE(biped.left->appliedForce().norm() > 1.);
+        BOOST_REQUIRE(biped.right->appliedForce().norm() > 1.);
+        change(biped);
+        const auto expectZero = [&] {
+          BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::InvalidInput);
+          BOOST_TEST(dynacom.allForces().isZero(0.));
+          for (const auto& name : dynacom.getKnownContacts())
+            BOOST_TEST(dynacom.getContact(name)->appliedForce().isZero(0.));
+          BOOST_TEST(dynacom.getDistribution().forces().isZero(0.));
+          BOOST_TEST(biped.right->appliedForce().isZero(0.));
+        };
+        for (int twice = 0; twice < 2; ++twice) {
+          if (byDynamics)
+            compute(dynacom, bad, Vector6::Zero(), false);
+          else
+            distribute(dynacom, Vector6::Constant(kNaN), dynacom.getCoM());
+          expectZero();
+        }
+
+        // The next answer is kept again.
+        compute(dynacom, x);
+        distribute(dynacom);
+        const VectorXd forces = dynacom.allForces();
+        BOOST_TEST(forces.norm() > 1.);
+        compute(dynacom, bad, Vector6::Zero(), false);
+        BOOST_TEST(close(dynacom.allForces(), forces, 0.));
+      }
+    }
+  }
+
+  // What was refused has changed nothing, and what does not concern forces neither.
+  Biped biped(134);
+  compute(biped.dynacom, restState(biped.model));
+  distribute(biped.dynacom);
+  const VectorXd forces = biped.dynacom.allForces();
+  BOOST_CHECK_THROW(biped.right->setMu(-1.), std::invalid_argument);
+  BOOST_CHECK_THROW(biped.right->initialize({}), std::invalid_argument);
+  BOOST_CHECK_THROW(biped.dynacom.setWrenchWeights(Vector6::Zero()), std::invalid_argument);
+  BOOST_CHECK_THROW(biped.dynacom.addContact(biped.left, "left"), std::invalid_argument);
+  BOOST_CHECK_THROW(biped.dynacom.removeContact("tail"), std::invalid_argument);
+  biped.dynacom.activateContact("left");
+  biped.dynacom.setGroundHeight(0.1);
+  biped.dynacom.setMinimalVerticalForce(2.);
+  distribute(biped.dynacom, Vector6::Constant(kNaN), biped.dynacom.getCoM());
+  BOOST_TEST(close(biped.dynacom.allForces(), forces, 0.));
+}
+
+BOOST_AUTO_TEST_CASE(a_copy_keeps_the_forces_too) {
+  Biped biped(135);
+  compute(biped.dynacom, restState(biped.model));
+  distribute(biped.dynacom);
+  DynaCoM copy = biped.dynacom;
+  const Vector3d com = copy.getCoM();
+  copy.deactivateContact("left");
+  distribute(copy, Vector6::Constant(kNaN), com);
+  BOOST_TEST(copy.allForces().isZero(0.));
+  const VectorXd forces = biped.dynacom.allForces();
+  for (DynaCoM other : {DynaCoM(biped.dynacom), biped.dynacom}) {
+    distribute(other, Vector6::Constant(kNaN), com);
+    BOOST_TEST(close(other.allForces(), forces, 0.));
+  }
+  distribute(biped.dynacom, Vector6::Constant(kNaN), com);
+  BOOST_TEST(close(biped.dynacom.allForces(), forces, 0.));
+}
+
+BOOST_AUTO_TEST_CASE(a_wrench_beyond_the_largest_numbers_is_a_status) {
+  Biped biped(136);
+  compute(biped.dynacom, restState(biped.model));
+  distribute(biped.dynacom);
+  const VectorXd forces = biped.dynacom.allForces();
+  const auto status = distribute(biped.dynacom, Vector6::Constant(1.7e308), biped.dynacom.getCoM());
+  BOOST_TEST(status == DistributionStatus::NumericalFailure);
+  BOOST_TEST(close(biped.dynacom.allForces(), forces, 0.));
+  BOOST_TEST(distribute(biped.dynacom) == DistributionStatus::Solved);
+}
+
+// --- Matrices ----------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(without_active_contacts_matrices_are_empty) {
   Biped biped(23);
@@ -707,7 +1543,7 @@ BOOST_AUTO_TEST_CASE(setters_of_a_shared_contact_act_on_the_next_call) {
   BOOST_TEST(distribute(biped.dynacom, wrench, com) == DistributionStatus::Solved);
   biped.left->setMu(0.1);
   biped.right->setMu(0.1);
-  BOOST_TEST(distribute(biped.dynacom, wrench, com) == DistributionStatus::Infeasible);
+  BOOST_TEST(distribute(biped.dynacom, wrench, com) == DistributionStatus::Relaxed);
   BOOST_TEST(close(biped.dynacom.fri_A().topLeftCorner<6, 6>(), biped.left->fri_A(), 0.));
 
   biped.left->setMu(0.7);
@@ -857,8 +1693,7 @@ BOOST_AUTO_TEST_CASE(forces_depend_on_neither_names_nor_history) {
     for (const std::size_t k : shuffled)
       fresh.addContact(contacts[k]->clone(), "c" + std::to_string(k));
     const auto freshStatus = distribute(fresh, wrench, com);
-    BOOST_REQUIRE((status == DistributionStatus::Solved) ==
-                  (freshStatus == DistributionStatus::Solved));
+    BOOST_REQUIRE(status == freshStatus);
     if (status == DistributionStatus::Solved) ++solved;
     if (active.empty()) BOOST_REQUIRE(status == DistributionStatus::NoContact);
     for (std::size_t k = 0; k < contacts.size(); ++k) {
@@ -924,6 +1759,10 @@ BOOST_AUTO_TEST_CASE(mistakes_are_named_and_change_nothing) {
   mistake([&] { dynacom.deactivateContact("tail"); }, {"tail", "left", "right"});
   mistake([&] { dynacom.removeContact6d("tail"); }, {"tail", "left", "right"});
   mistake([&] { dynacom.getContact(""); }, {"left", "right"});
+  mistake([&] { dynacom.getContactCoP("tail"); }, {"tail", "left", "right"});
+  mistake([&] { dynacom.getContactFrictionUsage("tail"); }, {"tail", "left", "right"});
+  mistake([&] { dynacom.getContactCoPMargin("tail"); }, {"tail", "left", "right"});
+  mistake([&] { dynacom.getContactYawUsage("tail"); }, {"tail", "left", "right"});
   // A name that is taken, by an active contact and by another.
   mistake([&] { dynacom.addContact(point, "left"); }, {"left"});
   mistake([&] { dynacom.addContact(point, "right"); }, {"right"});
@@ -959,8 +1798,10 @@ BOOST_AUTO_TEST_CASE(mistakes_are_named_and_change_nothing) {
   wrongSize(bad, "a", nv, 0);
 
   // A natural frequency is positive.
-  for (const auto& [omega, text] :
-       {std::pair<double, const char*>(0., "0"), {-0.25, "-0.25"}, {kNaN, "nan"}}) {
+  for (const auto& [omega, text] : {std::pair<double, const char*>(0., "0"),
+                                    {-0.25, "-0.25"},
+                                    {-kInfinity, "-inf"},
+                                    {kNaN, "nan"}}) {
     mistake([&, w = omega] { dynacom.computeNL(w); }, {"omega", text});
     const State y = biped.moving();
     mistake([&, w = omega] { dynacom.computeNL(w, y.q, y.v, y.a); }, {"omega", text});
@@ -988,17 +1829,37 @@ BOOST_AUTO_TEST_CASE(an_empty_dynacom_waits_for_a_robot) {
   notYet([&] { dynacom.distributeForce(Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero()); });
   notYet([&] { dynacom.addContact(makeSole("sole0"), "left"); });
   // There are no names that would be known.
-  for (const auto& action : {std::function<void()>([&] { dynacom.removeContact("left"); }),
-                             std::function<void()>([&] { dynacom.activateContact("left"); }),
-                             std::function<void()>([&] { dynacom.deactivateContact("left"); }),
-                             std::function<void()>([&] { dynacom.getContact("left"); })})
-    BOOST_CHECK_THROW(action(), std::logic_error);
+  for (const auto& action :
+       {std::function<void()>([&] { dynacom.removeContact("left"); }),
+        std::function<void()>([&] { dynacom.activateContact("left"); }),
+        std::function<void()>([&] { dynacom.deactivateContact("left"); }),
+        std::function<void()>([&] { dynacom.getContact("left"); }),
+        std::function<void()>([&] { dynacom.getContactCoP("left"); }),
+        std::function<void()>([&] { dynacom.getContactFrictionUsage("left"); }),
+        std::function<void()>([&] { dynacom.getContactCoPMargin("left"); }),
+        std::function<void()>([&] { dynacom.getContactYawUsage("left"); })})
+    BOOST_TEST(throws<std::invalid_argument>(action, {"left", "none"}));
+  BOOST_TEST(!dynacom.isInitialized());
+  BOOST_TEST(motionIsUnknown(dynacom));
+  BOOST_TEST(dynacom.allForces().size() == 0);
+  BOOST_TEST(dynacom.ne_A().size() == 0);
+  BOOST_TEST(allNaN(dynacom.getDistribution().wrench));
+  BOOST_TEST(std::isnan(dynacom.computeWrenchMargin().margin));
   BOOST_TEST(dynacom.getKnownContacts().empty());
   BOOST_TEST(dynacom.getActiveContacts().empty());
   BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::NoContact);
+  // Settings do not have to wait.
+  const Vector6 weights = Vector6::Constant(2.);
+  dynacom.setGroundHeight(0.1);
+  dynacom.setMinimalVerticalForce(2.5);
+  dynacom.setWrenchWeights(weights);
 
   const auto model = singleBody(50., stance(2));
   dynacom.initialize(model);
+  BOOST_TEST(dynacom.isInitialized());
+  BOOST_TEST(dynacom.getGroundHeight() == 0.1);
+  BOOST_TEST(dynacom.getMinimalVerticalForce() == 2.5);
+  BOOST_TEST(close(dynacom.getWrenchWeights(), weights, 0.));
   compute(dynacom, restState(model));
   BOOST_TEST(close(dynacom.getGroundCoMForce(), Vector3d(0., 0., 490.5)));
 }
@@ -1044,12 +1905,17 @@ BOOST_AUTO_TEST_CASE(gravity_of_a_model_lies_along_minus_z) {
 
 BOOST_AUTO_TEST_CASE(a_robot_has_a_mass) {
   BOOST_TEST(throws<std::invalid_argument>([] { DynaCoM dynacom{pinocchio::Model()}; }, {"mass"}));
-  BOOST_TEST(throws<std::invalid_argument>([] { DynaCoM dynacom(singleBody(0., {})); }, {"mass"}));
+  for (const double mass : {0., -1., kNaN, kInfinity}) {
+    auto model = singleBody(1., {});
+    model.inertias[1].mass() = mass;
+    BOOST_TEST(throws<std::invalid_argument>([&] { DynaCoM dynacom(model); }, {"mass"}));
+  }
 }
 
 BOOST_AUTO_TEST_CASE(initialize_takes_another_robot_and_forgets_the_contacts) {
   Biped biped(60);
   const State x = biped.moving();
+  biped.dynacom.setGroundHeight(0.1);
   biped.dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
 
   // In the other robot, the frames of the same names have other indices and other places.
@@ -1061,10 +1927,11 @@ BOOST_AUTO_TEST_CASE(initialize_takes_another_robot_and_forgets_the_contacts) {
   BOOST_TEST(biped.dynacom.getActiveContacts().empty());
   BOOST_TEST(biped.dynacom.allForces().size() == 0);
   BOOST_TEST(biped.dynacom.getDistributionStatus() == DistributionStatus::NoContact);
-  BOOST_TEST(allNaN(biped.dynacom.getCoM()));
-  BOOST_TEST(allNaN(biped.dynacom.getCoP()));
-  BOOST_TEST(allNaN(biped.dynacom.getNL()));
+  BOOST_TEST(motionIsUnknown(biped.dynacom));
   BOOST_TEST(close(biped.dynacom.getMass(), totalMass(other)));
+  BOOST_TEST(biped.dynacom.getGroundHeight() == 0.1);
+  // The forces of the robot before are not kept for this one.
+  BOOST_TEST(biped.left->appliedForce().isZero(0.));
 
   biped.dynacom.addContact(biped.left, "left");
   biped.dynacom.addContact(biped.right, "right");
@@ -1140,6 +2007,21 @@ BOOST_AUTO_TEST_CASE(a_move_keeps_the_contacts) {
   const DynaCoM moved = std::move(biped.dynacom);
   BOOST_TEST(same(everythingSeen(moved), before));
   BOOST_TEST(moved.getContact("left") == biped.left);
+}
+
+BOOST_AUTO_TEST_CASE(what_was_moved_from_can_be_used_again) {
+  Biped biped(65);
+  const DynaCoM moved = std::move(biped.dynacom);
+  DynaCoM another(moved), assigned(moved);
+  const DynaCoM away = std::move(another), gone = std::move(assigned);
+  assigned = moved;
+  for (DynaCoM* dynacom : {&another, &assigned}) {
+    dynacom->initialize(biped.model);
+    dynacom->addContact(makeSole("sole0"), "left");
+    dynacom->addContact(makeSole("sole1"), "right");
+    compute(*dynacom, restState(biped.model));
+    BOOST_TEST(distribute(*dynacom) == DistributionStatus::Solved);
+  }
 }
 
 BOOST_AUTO_TEST_CASE(settings_compare_and_print_by_every_field) {
@@ -1279,6 +2161,19 @@ BOOST_AUTO_TEST_CASE(a_urdf_is_a_path_or_the_text_itself) {
   BOOST_TEST(close(fromPath.getCoP(), Vector2d(12.5 * 0.01 / 15., 12.5 * 0.02 / 15.), 1e-9));
 }
 
+BOOST_AUTO_TEST_CASE(a_path_may_have_spaces_and_odd_letters) {
+  const TemporaryDirectory directory;
+  for (const char* name : {" leading.urdf", "trailing ", "two  spaces", "r\u00f6bot.urdf", "a'b\"c",
+                           "no extension", "percent%20.urdf", "<robot>.urdf"}) {
+    const std::string path = directory.write(name, kUrdf);
+    BOOST_TEST_CONTEXT(path) {
+      DynaCoM dynacom;
+      BOOST_TEST(printedBy([&] { dynacom.initialize(settingsOf(path)); }) == "");
+      BOOST_TEST(close(dynacom.getMass(), 15.));
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(a_text_may_begin_with_white_space) {
   const DynaCoM dynacom(settingsOf("\n  \t" + kUrdf.substr(kUrdf.find("<robot"))));
   BOOST_TEST(close(dynacom.getMass(), 15.));
@@ -1300,38 +2195,71 @@ BOOST_AUTO_TEST_CASE(a_urdf_that_cannot_be_read_is_refused_in_silence) {
   const TemporaryDirectory directory;
   const std::string missing = directory.path() + "/missing.urdf";
   const std::string noXml = directory.write("no xml.urdf", "This is a shopping list.");
+  const std::string binary = directory.write("binary.urdf", std::string("\x7f"
+                                                                        "ELF\0\x01\x02<",
+                                                                        8));
   const std::string truncated = directory.write("truncated.urdf", kUrdf.substr(0, 400));
   const std::string empty = directory.write("empty.urdf", "");
-  const std::string massless =
-      directory.write("massless.urdf", "<robot name=\"ghost\"><link name=\"sheet\"/></robot>");
+  const std::string blank = directory.write("blank.urdf", " \n\n");
+  const std::string ghost = "<robot name=\"ghost\"><link name=\"sheet\"/></robot>";
+  const std::string massless = directory.write("massless.urdf", ghost);
+  const auto withMass = [](const std::string& mass) {
+    return "<robot name=\"odd\"><link name=\"a\"><inertial><mass value=\"" + mass +
+           "\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial>"
+           "</link></robot>";
+  };
 
   Biped biped(70);
-  compute(biped.dynacom, restState(biped.model));
-  const View before = everythingSeen(biped.dynacom);
+  DynaCoM& dynacom = biped.dynacom;
+  const State x = restState(biped.model);
+  dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
+  const View before = everythingSeen(dynacom);
+  DynaCoM blankSlate;
   const auto refused = [&](const std::string& urdf, std::initializer_list<std::string> words) {
-    boost::test_tools::predicate_result result(false);
+    boost::test_tools::predicate_result result(false), first(false), constructed(false);
     const std::string printed = printedBy([&] {
-      result =
-          throws<std::invalid_argument>([&] { biped.dynacom.initialize(settingsOf(urdf)); }, words);
+      result = throws<std::invalid_argument>([&] { dynacom.initialize(settingsOf(urdf)); }, words);
+      first =
+          throws<std::invalid_argument>([&] { blankSlate.initialize(settingsOf(urdf)); }, words);
+      constructed = throws<std::invalid_argument>([&] { DynaCoM(settingsOf(urdf)); }, words);
     });
     BOOST_TEST_CONTEXT("URDF: " << urdf) {
       BOOST_TEST(result);
+      BOOST_TEST(first);
+      BOOST_TEST(constructed);
       BOOST_TEST(printed == "");
-      BOOST_TEST(same(everythingSeen(biped.dynacom), before));
+      BOOST_TEST(!blankSlate.isInitialized());
+      BOOST_TEST(same(everythingSeen(dynacom), before));
+      // The robot that was there still works.
+      dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
+      BOOST_TEST(same(everythingSeen(dynacom), before));
     }
   };
   refused("", {"urdf"});
   refused(missing, {"urdf", missing});
+  refused("no_such_robot", {"urdf", "no_such_robot"});
+  refused("no such robot.urdf", {"urdf", "no such robot.urdf"});
   refused(directory.path(), {"urdf", directory.path(), "directory"});
+  refused(directory.path() + "/", {"urdf", directory.path(), "directory"});
   refused(noXml, {"urdf", noXml});
+  refused(binary, {"urdf", binary});
   refused(truncated, {"urdf", truncated});
   refused(empty, {"urdf", empty});
-  refused(massless, {"mass"});
+  refused(blank, {"urdf", blank});
+  refused(massless, {"mass", "ghost"});
+  refused(ghost, {"mass", "ghost"});
+  refused(" ", {"urdf"});
   refused("This is a shopping list.", {"urdf"});
   refused(kUrdf.substr(0, 400), {"urdf"});
   refused("<robot", {"urdf"});
   refused("<html><body>Not found</body></html>", {"urdf"});
   refused("<robot name=\"nothing\"></robot>", {"urdf"});
+  // Masses that are none.
+  refused(withMass("0"), {"mass"});
+  refused(withMass("-1"), {"mass"});
+  refused(withMass("nan"), {});
+  refused(withMass("inf"), {});
+  refused(withMass("heavy"), {"urdf"});
   // A joint that leads nowhere, and a link that nobody holds.
   refused(
       "<robot name=\"odd\"><link name=\"a\"/><joint name=\"j\" type=\"fixed\">"
@@ -1339,6 +2267,11 @@ BOOST_AUTO_TEST_CASE(a_urdf_that_cannot_be_read_is_refused_in_silence) {
       {"urdf"});
   refused("<robot name=\"odd\"><link name=\"a\"/><link name=\"b\"/></robot>", {"urdf"});
 
-  // The robot that was there still works.
-  BOOST_TEST(distribute(biped.dynacom) == DistributionStatus::Solved);
+  // Neither has been spoilt for another robot.
+  for (DynaCoM* one : {&dynacom, &blankSlate}) {
+    one->initialize(settingsOf(kUrdf));
+    one->addContact(makeSole("sole"), "sole");
+    compute(*one, restState(one->getModel()), Vector6::Zero(), false);
+    BOOST_TEST(one->getDistributionStatus() == DistributionStatus::Solved);
+  }
 }

@@ -2,8 +2,10 @@
 #define BOOST_TEST_MODULE minimum_norm
 #include <Eigen/QR>
 #include <boost/test/unit_test.hpp>
+#include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "minimum_norm.hpp"
 
@@ -91,12 +93,42 @@ class Random {
   std::normal_distribution<double> normal_;
 };
 
+// The conditions of a minimum: x + E y + G z = 0 with z ≥ 0 on active inequalities, which are
+// equations, and 0 on all others.
+void checkConditions(const Problem& problem, const MinimumNorm& solver) {
+  const Index m = problem.G.cols();
+  BOOST_REQUIRE(solver.y().size() == problem.E.cols());
+  BOOST_REQUIRE(solver.z().size() == m);
+  const double terms = 1. + solver.x().norm() + solver.y().lpNorm<1>() + solver.z().lpNorm<1>();
+  BOOST_TEST((solver.x() + problem.E * solver.y() + problem.G * solver.z()).norm() <=
+             1e-10 * terms);
+
+  std::vector<bool> active(static_cast<std::size_t>(m), false);
+  for (const Index j : solver.active()) {
+    BOOST_REQUIRE(j >= 0);
+    BOOST_REQUIRE(j < m);
+    BOOST_TEST(!active[static_cast<std::size_t>(j)], "inequality " << j << " is active twice");
+    active[static_cast<std::size_t>(j)] = true;
+  }
+  for (Index j = 0; j < m; ++j) {
+    const double slack = problem.h[j] - problem.G.col(j).dot(solver.x());
+    if (active[static_cast<std::size_t>(j)]) {
+      BOOST_TEST(solver.z()[j] >= -1e-10 * terms);
+      BOOST_TEST(std::abs(slack) <= 1e-9 * terms);
+    } else {
+      BOOST_TEST(solver.z()[j] == 0.);
+    }
+  }
+  BOOST_TEST(solver.iterations() >= static_cast<int>(solver.active().size()));
+}
+
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(agrees_with_an_enumeration_of_all_active_sets) {
   Random random;
   MinimumNorm solver;
   int solved = 0, infeasible = 0;
+  std::size_t active = 0;
   for (int i = 0; i < 3000; ++i) {
     const Problem problem = random.problem();
     VectorXd expected;
@@ -109,11 +141,14 @@ BOOST_AUTO_TEST_CASE(agrees_with_an_enumeration_of_all_active_sets) {
       } else {
         BOOST_TEST((status == MinimumNorm::Status::Solved));
         BOOST_TEST((solver.x() - expected).norm() <= 1e-8 * (1. + least));
+        checkConditions(problem, solver);
+        active += solver.active().size();
         ++solved;
       }
     }
   }
   BOOST_TEST(solved > 1500);
+  BOOST_TEST(active > 1500u);
   BOOST_TEST(infeasible > 300);
 }
 
@@ -125,6 +160,50 @@ BOOST_AUTO_TEST_CASE(equalities_alone_give_the_pseudoinverse) {
       (solver.solve(E, d, MatrixXd(3, 0), VectorXd(0), kTolerance) == MinimumNorm::Status::Solved));
   // x = (2, 1, 0): the first component by the first equality, the second by 0.6·2 + 0.8·1 = 2.
   BOOST_TEST((solver.x() - Eigen::Vector3d(2., 1., 0.)).norm() < 1e-15 * 10.);
+  // x + E y = 0: by the second component y₂ = −1 / 0.8, and by the first y₁ = −2 + 0.6 / 0.8.
+  BOOST_TEST((solver.y() - Eigen::Vector2d(-1.25, -1.25)).norm() < 1e-14);
+  BOOST_TEST(solver.z().size() == 0);
+  BOOST_TEST(solver.active().empty());
+  BOOST_TEST(solver.iterations() == 0);
+}
+
+BOOST_AUTO_TEST_CASE(inequalities_are_active_where_they_bind) {
+  // x₁ = 1 with x₁ + x₂ ≤ 0, and x₂ ≤ 5, which does not bind: x = (1, −1).
+  const MatrixXd E = (MatrixXd(2, 1) << 1., 0.).finished();
+  const MatrixXd G = (MatrixXd(2, 2) << 0., 1., 1., 1.).finished();
+  MinimumNorm solver;
+  BOOST_TEST((solver.solve(E, VectorXd::Ones(1), G, Eigen::Vector2d(5., 0.), kTolerance) ==
+              MinimumNorm::Status::Solved));
+  BOOST_TEST((solver.x() - Eigen::Vector2d(1., -1.)).norm() < 1e-14);
+  // By the second component z₂ = 1, by the first y = −1 − 1.
+  BOOST_TEST((solver.z() - Eigen::Vector2d(0., 1.)).norm() < 1e-14);
+  BOOST_TEST(std::abs(solver.y()[0] + 2.) < 1e-14);
+  BOOST_REQUIRE(solver.active().size() == 1u);
+  BOOST_TEST(solver.active()[0] == 1);
+  BOOST_TEST(solver.iterations() == 1);
+
+  // With room enough, none is, and what was before is forgotten.
+  BOOST_TEST((solver.solve(E, VectorXd::Ones(1), G, Eigen::Vector2d(5., 1.), kTolerance) ==
+              MinimumNorm::Status::Solved));
+  BOOST_TEST((solver.x() - Eigen::Vector2d(1., 0.)).norm() < 1e-14);
+  BOOST_TEST(solver.active().empty());
+  BOOST_TEST(solver.z().isZero(0.));
+  BOOST_TEST(solver.iterations() == 0);
+}
+
+BOOST_AUTO_TEST_CASE(an_inequality_made_active_too_early_is_left) {
+  // x₁ ≥ 2 and 0.1 x₁ + 0.1 x₂ ≥ 1: the first is violated most and becomes active, but with the
+  // second comes (5, 5), where the first does not bind.
+  const MatrixXd G = (MatrixXd(2, 2) << -1., -0.1, 0., -0.1).finished();
+  MinimumNorm solver;
+  BOOST_TEST((solver.solve(MatrixXd(2, 0), VectorXd(0), G, Eigen::Vector2d(-2., -1.), kTolerance) ==
+              MinimumNorm::Status::Solved));
+  BOOST_TEST((solver.x() - Eigen::Vector2d(5., 5.)).norm() < 1e-13);
+  BOOST_TEST((solver.z() - Eigen::Vector2d(0., 50.)).norm() < 1e-12);
+  BOOST_REQUIRE(solver.active().size() == 1u);
+  BOOST_TEST(solver.active()[0] == 1);
+  // Active, left, active.
+  BOOST_TEST(solver.iterations() == 3);
 }
 
 BOOST_AUTO_TEST_CASE(half_spaces_without_a_common_point_are_infeasible) {

@@ -199,8 +199,7 @@ class DYNACOM_EXPORT DynaCoM {
                                      const Eigen::Vector3d& groundCoMTorque,
                                      const Eigen::Vector3d& com);
   /// The last distribution, be it distributeForce()'s or computeDynamics()'s own; its contacts are
-  /// those that were active then, in the order of their activation. As it was before the first
-  /// distribution once contacts are added, removed, activated or deactivated.
+  /// those that were active then, in the order of their activation.
   const DistributionResult& getDistribution() const { return distribution_.result(); }
   /// Its status: DistributionStatus::NoContact before the first.
   DistributionStatus getDistributionStatus() const { return getDistribution().status; }

@@ -54,8 +54,7 @@ struct MotionAnalysis {
   struct Contact {
     std::string name;
     Eigen::Array<bool, Eigen::Dynamic, 1> active;
-    /// Wrench (force, moment) in the surface's frame, about its origin; zero where not active or
-    /// not solved.
+    /// Wrench (force, moment) in the surface's frame, about its origin; zero where not active.
     Eigen::Matrix<double, 6, Eigen::Dynamic> wrench;
     /// Vertical component of the force, in the world [N].
     Eigen::VectorXd vertical_force;

@@ -147,7 +147,7 @@ class DYNACOM_EXPORT WrenchDistribution {
   ///                      all rounding, is one
   DistributionStatus solve(const Vector6& wrench, double minimalScale = 0.);
 
-  /// The last solve()'s answer. clear() and add() change its contacts, solve() makes it whole.
+  /// The last solve()'s answer.
   const DistributionResult& result() const;
 
   /// Forgets the forces that a solve() without an answer would keep: until there is one again, they

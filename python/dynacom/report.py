@@ -3,7 +3,8 @@
 
 import csv
 import os
-import tempfile
+import secrets
+import shutil
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -60,19 +61,22 @@ def results_folder(path: Path) -> Iterator[Path]:
     Raises:
         OSError: path is not a folder, or cannot be written to.
     """
-    existed = path.exists()
-    path.mkdir(parents=True, exist_ok=True)
+    existed, finished = path.exists(), False
+    # Inside, so that it is on the same file system and needs no right to write elsewhere. Its name
+    # is known before it is made: an interruption may come at any time.
+    temporary = path / f".dynacom-{secrets.token_hex(8)}"
     try:
-        # Inside, so that it is on the same file system and needs no right to write elsewhere.
-        with tempfile.TemporaryDirectory(prefix=".dynacom-", dir=path) as temporary:
-            yield Path(temporary)
-            for file in sorted(Path(temporary).iterdir()):
-                os.replace(file, path / file.name)
-    except BaseException:
-        if not existed:
+        path.mkdir(parents=True, exist_ok=True)
+        temporary.mkdir()
+        yield temporary
+        for file in sorted(temporary.iterdir()):
+            os.replace(file, path / file.name)
+        finished = True
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        if not existed and not finished:
             with suppress(OSError):
                 path.rmdir()
-        raise
 
 
 @dataclass(frozen=True)

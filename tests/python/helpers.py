@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: BSD-2-Clause
-"""What several of the tests need: arrays of all sorts, random robots, a quadratic program."""
+"""What several of the tests need: arrays of all sorts, random robots, another solver."""
 
+import itertools
 import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from hypothesis import settings
+from scipy.optimize import nnls
 
 import dynacom
 from dynacom import Contact6D, Contact6DSettings, ContactPoint, ContactPointSettings, DynaCoM
@@ -161,74 +164,96 @@ def cost(weights: np.ndarray, forces: np.ndarray) -> float:
     return 0.5 * float(np.sum((weights * forces) ** 2))
 
 
-def cheapest_forces(
-    contacts: Sequence[dynacom.ContactBase], wrench: np.ndarray
-) -> np.ndarray | None:
-    """The quadratic program (9-13), solved another way; None where it is infeasible.
-
-    What the equalities leave free is a problem of least distance, min |z| subject to G z >= h,
-    which Lawson and Hanson (Solving Least Squares Problems, chapter 23) turn into one of
-    non-negative least squares.
-    """
-    scale = np.linalg.norm(wrench)
-    weights = np.concatenate([contact.reg_A() for contact in contacts])
-    equalities = np.hstack([contact.ne_A() for contact in contacts]) / weights
-    A = block_diagonal([inequalities(contact) for contact in contacts]) / weights
-    base = np.linalg.lstsq(equalities, wrench / scale, rcond=None)[0]
-    if np.linalg.norm(equalities @ base - wrench / scale) > 1e-9:
-        return None
-    rank = np.linalg.matrix_rank(equalities)
-    free = np.linalg.svd(equalities)[2][rank:].T
-    rows = np.linalg.norm(A, axis=1, keepdims=True)
-    G, h = -(A / rows) @ free, (A / rows) @ base
-    if free.shape[1] == 0:
-        return scale * base / weights if h.max() <= 1e-9 else None
-    # The rows' unit is |base|, the least cost without inequalities.
-    unit = np.linalg.norm(base)
-    E = np.vstack([G.T, h / unit])
-    f = np.append(np.zeros(free.shape[1]), 1.0)
-    multipliers = nonnegative_least_squares(E, f)
-    residual = E @ multipliers - f
-    if np.linalg.norm(residual) < 1e-7:
-        return None
-    # More digits than residual's last component has: the rows that hold are known now.
-    tight = multipliers > 0.0
-    z = np.linalg.lstsq(G[tight], h[tight], rcond=None)[0] if tight.any() else 0.0 * f[:-1]
-    return scale * (base + free @ z) / weights
-
-
 def nonnegative_least_squares(A: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """x >= 0 that minimises |A x - b|, by Lawson and Hanson's active sets."""
-    x = np.zeros(A.shape[1])
-    passive = np.zeros(A.shape[1], dtype=bool)
-    # Those that would enter by rounding alone, only to leave at once.
-    refused = np.zeros(A.shape[1], dtype=bool)
-    for _ in range(10 * A.shape[1]):
-        gradient = np.where(passive | refused, -np.inf, A.T @ (b - A @ x))
-        entering = np.argmax(gradient)
-        if gradient[entering] <= 1e-12:
-            return x
-        passive[entering] = True
-        trial = _least_squares(A, b, passive)
-        if trial[entering] <= 0.0:
-            passive[entering], refused[entering] = False, True
-            continue
-        refused[:] = False
-        while trial[passive].min() <= 0.0:
-            leaving = passive & (trial <= 0.0)
-            step = np.min(x[leaving] / (x[leaving] - trial[leaving]))
-            x = np.where(passive, x + step * (trial - x), 0.0)
-            passive &= x > 1e-14
-            trial = _least_squares(A, b, passive)
-        x = trial
-    raise RuntimeError("non-negative least squares did not end")
+    """x >= 0 that minimises |A x - b|."""
+    return nnls(A, b, maxiter=10000)[0] if A.shape[1] else np.zeros(0)  # which nnls takes ill
 
 
-def _least_squares(A: np.ndarray, b: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """x that minimises |A x - b| and is zero outside of some columns."""
-    x = np.zeros(A.shape[1])
-    x[columns] = np.linalg.lstsq(A[:, columns], b, rcond=None)[0]
-    return x
+def generators(contact: dynacom.ContactBase) -> np.ndarray:
+    """The edges of a contact's cone, by its settings alone: every force in it is a sum of them."""
+    settings = contact.getSettings()
+    limits = [settings.mu, settings.mu]
+    if contact.cols() == 6:
+        limits += [settings.half_width, settings.half_length, settings.gu]
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=len(limits)))) * limits
+    return np.unique(np.insert(corners, 2, 1.0, axis=1), axis=0).T
+
+
+class Shares(NamedTuple):
+    """What contacts can give of a wrench, computed another way."""
+
+    #: The reachable wrench that is the closest to it.
+    closest: np.ndarray
+    #: The weighted distance of the two, over the weighted norm of the wrench.
+    distance: float
+    #: The cheapest forces that give the closest.
+    forces: np.ndarray
+
+
+class Closest(NamedTuple):
+    """The reachable wrench closest to another, computed another way."""
+
+    wrench: np.ndarray
+    #: The weighted distance of the two, over the weighted norm of what was asked for.
+    distance: float
+    #: The edges of the cones that lie in the residual's supporting plane, one column each, and what
+    #: they give of the weighted wrench, over that norm; at unit length.
+    edges: np.ndarray
+    rays: np.ndarray
+
+
+def closest_by_edges(
+    contacts: Sequence[dynacom.ContactBase], wrench: np.ndarray, weights: np.ndarray | None = None
+) -> Closest:
+    """The first stage of a distribution as a problem of non-negative least squares.
+
+    Its variables are the shares of the cones' edges, so that no inequality is left.
+    """
+    weights = np.ones(6) if weights is None else weights
+    scale = np.linalg.norm(weights * wrench)
+    asked = weights * wrench / scale
+    edges = block_diagonal([generators(contact) for contact in contacts])
+    rays = weights[:, None] * (np.hstack([contact.ne_A() for contact in contacts]) @ edges)
+    sizes = np.linalg.norm(rays, axis=0)
+    edges, rays = edges / sizes, rays / sizes
+
+    closest = rays @ nonnegative_least_squares(rays, asked)
+    residual = asked - closest
+    distance = np.linalg.norm(residual)
+    if distance > 1e-8:
+        on_face = residual @ rays >= -1e-7 * distance
+        edges, rays = edges[:, on_face], rays[:, on_face]
+    return Closest(scale * closest / weights, float(distance), edges, rays)
+
+
+def share_by_edges(
+    contacts: Sequence[dynacom.ContactBase], wrench: np.ndarray, weights: np.ndarray | None = None
+) -> Shares:
+    """Both stages of a distribution as problems of non-negative least squares.
+
+    In the second, edges that lead away from the residual's supporting plane have no share.
+    """
+    found = closest_by_edges(contacts, wrench, weights)
+    weights = np.ones(6) if weights is None else weights
+    scale = np.linalg.norm(weights * wrench)
+    closest, edges, rays = weights * found.wrench / scale, found.edges, found.rays
+
+    costs = np.concatenate([contact.reg_A() for contact in contacts])
+    costs = costs[:, None] / costs.max() * edges
+    # The method of multipliers: what is missing is asked for again.
+    stiffness, asked = 1e4, closest
+    for _ in range(20):
+        shares = nonnegative_least_squares(
+            np.vstack([stiffness * rays, costs]),
+            np.concatenate([stiffness * asked, np.zeros(len(costs))]),
+        )
+        missing = closest - rays @ shares
+        asked = asked + missing
+        if np.linalg.norm(missing) < 1e-13:
+            break
+    else:
+        raise RuntimeError("the multipliers have not converged")
+    return Shares(found.wrench, found.distance, scale * (edges @ shares))
 
 
 def assert_within_cones(contact: dynacom.ContactBase, tolerance: float) -> None:

@@ -258,6 +258,37 @@ def test_ground_wrench_by_hand():
     assert_array_equal(ground.torque, [0, 0, -1])
 
 
+def test_accelerations_of_a_ground_wrench_by_hand():
+    state = make_state(mass=2.0, com=np.ones(3), acom=np.full(3, 9.0), amVariation=np.full(3, 9.0))
+    ground = make_wrench([2, 4, 26], [4, 5, 6])
+    caused = dynacom.applyGroundWrench(state, ground, np.array([0, 0, -10]))
+    assert_array_equal(caused.acom, [1, 2, 3])
+    assert_array_equal(caused.amVariation, [4, 5, 6])
+    assert caused.mass == 2.0
+    assert_array_equal(caused.com, np.ones(3))
+    assert_array_equal(state.acom, np.full(3, 9.0))
+    pushed = {"gravity": np.array([0, 0, -10]), "extWrench": np.array([2, 4, 6, 1, 2, 3])}
+    caused = dynacom.applyGroundWrench(state=state, groundWrench=ground, **pushed)
+    assert_array_equal(caused.acom, [2, 4, 6])
+    assert_array_equal(caused.amVariation, [5, 7, 9])
+
+
+@CALM
+@given(motions(), vectors(6))
+def test_accelerations_are_those_of_the_ground_wrench(motion, wrench):
+    """One function is the other's inverse."""
+    model, q, v, a = motion
+    state = dynacom.computeCentroidalState(model, model.createData(), q, v, a)
+    ground = dynacom.computeGroundWrench(state, GRAVITY, wrench)
+    caused = dynacom.applyGroundWrench(state, ground, GRAVITY, wrench)
+    size = np.abs(ground.force).max() + np.abs(wrench).max() + 10.0 * state.mass
+    assert_allclose(caused.acom, state.acom, rtol=0, atol=1e-15 * size / state.mass)
+    size = np.abs(ground.torque).max() + np.abs(wrench).max()
+    assert_allclose(caused.amVariation, state.amVariation, rtol=0, atol=1e-15 * size)
+    for name in ("mass", "com", "vcom", "am"):
+        assert_array_equal(getattr(caused, name), getattr(state, name))
+
+
 def test_centre_of_pressure_by_hand():
     """100 N up, 10 N along x and 20 N along y, from a centre of mass 0.8 m above the ground."""
     com = np.array([1.0, 2.0, 0.8])
@@ -301,6 +332,14 @@ def test_centre_of_pressure_needs_a_newton(force, means_something):
     assert cop.shape == (2,)
     assert np.isfinite(cop).all() == means_something
     assert np.isnan(cop).all() != means_something
+
+
+def test_another_minimal_vertical_force():
+    wrench = make_wrench([0.0, 0.0, 0.1], np.zeros(3))
+    cop = dynacom.computeFlatGroundCoP(wrench, np.ones(3), 0.0, 0.1)
+    assert_array_equal(cop, np.ones(2))
+    cop = dynacom.computeFlatGroundCoP(wrench, np.ones(3), minimalVerticalForce=0.11)
+    assert np.isnan(cop).all()
 
 
 def test_virtual_repellent_point_by_hand():

@@ -533,6 +533,60 @@ def test_centre_of_pressure(the_point, the_sole):
     assert_allclose(the_sole.getCoP(), [0.03, -0.02], rtol=1e-15)
 
 
+def test_usage_and_margin(the_point, the_sole):
+    """How much of friction, of yaw friction and of the distance to the edges a force leaves."""
+    for contact in (the_point, the_sole):
+        size = contact.cols()
+        assert contact.getFrictionUsage() == 0.0
+        assert np.isnan(contact.getCoPMargin())
+        for force, usage in (
+            ([0.15, -0.3, 2.0, 0.0, 0.0, 0.0], 0.5),
+            ([-0.6, 0.0, 2.0, 0.0, 0.0, 0.0], 1.0),
+            ([0.0, 0.0, 2.0, 0.0, 0.0, 0.0], 0.0),
+            ([0.0, 0.9, 2.0, 0.0, 0.0, 0.0], 1.5),
+            ([0.1, 0.0, 0.0, 0.0, 0.0, 0.0], np.inf),
+            ([0.1, 0.0, -2.0, 0.0, 0.0, 0.0], np.inf),
+            ([0.0, 0.0, -2.0, 0.0, 0.0, 0.0], np.inf),
+        ):
+            contact.applyForce(np.array(force[:size]))
+            assert contact.getFrictionUsage() == pytest.approx(usage, rel=1e-15)
+        contact.deactivate()
+        assert contact.getFrictionUsage() == 0.0
+    the_point.applyForce(np.array([0.0, 0.0, 2.0]))
+    assert np.isnan(the_point.getCoPMargin())
+    assert np.isnan(the_point.getYawUsage())
+
+    assert the_sole.getYawUsage() == 0.0
+    for force, usage, margin in (
+        ([0.0, 0.0, 2.0, 0.0, 0.0, 0.0], 0.0, DY),
+        ([0.0, 0.0, 2.0, 0.04, 0.0, -0.2], 0.25, DY - 0.02),
+        ([0.0, 0.0, 2.0, 0.0, 0.18, 0.8], 1.0, DX - 0.09),
+        ([0.0, 0.0, 2.0, 0.0, -0.2, 0.0], 0.0, 0.0),
+        ([0.0, 0.0, 2.0, 0.0, -0.3, 1.6], 2.0, -0.05),
+        ([0.0, 0.0, -2.0, 0.0, 0.0, 0.1], np.inf, np.nan),
+    ):
+        the_sole.applyForce(np.array(force))
+        assert the_sole.getYawUsage() == pytest.approx(usage, rel=1e-15)
+        assert the_sole.getCoPMargin() == pytest.approx(margin, abs=1e-16, nan_ok=True)
+
+
+def test_usage_of_what_is_not_there(the_point, the_sole):
+    """No friction: there is none to use. No extent: every edge is where the force is."""
+    for contact in (the_point, the_sole):
+        contact.setMu(0.0)
+        contact.applyForce(np.ones(contact.cols()))
+        assert np.isnan(contact.getFrictionUsage())
+    the_sole.setGu(0.0)
+    the_sole.setSurfaceHalfLength(0.0)
+    the_sole.applyForce(np.array([0.0, 0.0, 2.0, 0.0, 0.0, 0.0]))
+    assert np.isnan(the_sole.getYawUsage())
+    assert the_sole.getCoPMargin() == 0.0
+    for waiting in (ContactPoint(), Contact6D()):
+        assert np.isnan(waiting.getFrictionUsage())
+        assert np.isnan(waiting.getCoPMargin())
+        assert np.isnan(waiting.getYawUsage())
+
+
 @CALM
 @given(st.integers(0, 2**32 - 1))
 def test_unilaterality_keeps_the_centre_of_pressure_inside(seed):

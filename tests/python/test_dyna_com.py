@@ -33,17 +33,19 @@ from helpers import (
     assert_gives_wrench,
     assert_within_cones,
     block_diagonal,
-    cheapest_forces,
     documentation,
     point,
     random_configuration,
     random_humanoid,
     reference_configuration,
     robots_folder,
+    share_by_edges,
     sole,
 )
 
 SOLVED = DistributionStatus.Solved
+RELAXED = DistributionStatus.Relaxed
+INVALID = DistributionStatus.InvalidInput
 G = 9.81
 
 PENDULUM = """
@@ -103,10 +105,16 @@ def state(robot: DynaCoM) -> dict[str, object]:
     values = {name: getattr(robot, name)() for name in GETTERS}
     values["data.com"] = robot.getData().com[0].copy()
     values["data.oMi"] = [placement.homogeneous for placement in robot.getData().oMi]
+    result = robot.getDistribution()
+    for name in ("wrench", "achieved", "residual", "scale", "cost", "iterations"):
+        values[f"distribution.{name}"] = getattr(result, name)
+    values["distribution.forces"] = result.forces()
     for name in robot.getKnownContacts():
         contact = robot.getContact(name)
         for item in ("appliedForce", "ne_A", "reg_A", "uni_A", "fri_A", "getFrameID"):
             values[f"{name}.{item}"] = getattr(contact, item)()
+        for item in CONTACT_GETTERS:
+            values[f"{name}.{item}"] = np.array(getattr(robot, item)(name))
         values[f"{name}.pose"] = contact.getPose().homogeneous
     return values
 
@@ -122,6 +130,14 @@ MOTION_GETTERS = (
     "getCoP",
     "getVRP",
     "getNL",
+    "getFeasibleACoM",
+    "getFeasibleAMVariation",
+)
+CONTACT_GETTERS = (
+    "getContactCoP",
+    "getContactFrictionUsage",
+    "getContactCoPMargin",
+    "getContactYawUsage",
 )
 STACKED = ("uni_A", "uni_b", "fri_A", "fri_b", "reg_A", "reg_b", "ne_A", "ne_b", "allForces")
 GETTERS = (
@@ -129,6 +145,9 @@ GETTERS = (
     *STACKED,
     "getMass",
     "getGroundHeight",
+    "getMinimalVerticalForce",
+    "getWrenchWeights",
+    "isCoPDefined",
     "getSettings",
     "getActiveContacts",
     "getKnownContacts",
@@ -139,7 +158,7 @@ GETTERS = (
 def assert_same(actual: dict[str, object], expected: dict[str, object]) -> None:
     assert actual.keys() == expected.keys()
     for name, value in expected.items():
-        if isinstance(value, np.ndarray | list) and name not in (
+        if isinstance(value, np.ndarray | list | float) and name not in (
             "getActiveContacts",
             "getKnownContacts",
         ):
@@ -243,13 +262,24 @@ def test_gravity_in_other_directions(robot, humanoid, gravity):
     assert_same(state(robot), before)
 
 
+NO_URDF = "is not a robot's URDF"
+
+
 @pytest.mark.parametrize(
     ("urdf", "message"),
     [
         ("", "urdf must be a file or XML, got ''"),
-        ("no/such/file.urdf", "urdf.*cannot read the file 'no/such/file.urdf'"),
-        ("<robot", "urdf.*the XML given is not a robot's URDF"),
-        ("<html></html>", "urdf.*the XML given is not a robot's URDF"),
+        ("  ", "urdf: cannot read the file '  '"),
+        ("no/such/file.urdf", "urdf: cannot read the file 'no/such/file.urdf'"),
+        ("hello world", "urdf: cannot read the file 'hello world'"),
+        ("<robot", f"urdf: the XML given {NO_URDF}"),
+        (PENDULUM[:300], f"urdf: the XML given {NO_URDF}"),
+        (PENDULUM[:-10], f"urdf: the XML given {NO_URDF}"),
+        ("<html></html>", f"urdf: the XML given {NO_URDF}"),
+        ('<?xml version="1.0"?>', f"urdf: the XML given {NO_URDF}"),
+        (PENDULUM.replace("bob", "base"), f"urdf: the XML given {NO_URDF}.*'base' is not unique"),
+        (PENDULUM.replace('"2"', '"two"'), "urdf: the XML given has errors.*two"),
+        (PENDULUM.replace('"2"', '"nan"'), "urdf: the XML given has errors.*nan"),
         ("<robot name='ghost'><link name='a'/></robot>", "'ghost' must have a mass > 0, got 0"),
     ],
 )
@@ -266,13 +296,56 @@ def test_urdf_that_cannot_be_read(robot, urdf, message):
     assert distribute(robot) == SOLVED
 
 
-def test_urdf_messages_are_plain(tmp_path):
+FILES = {
+    "empty": b"",
+    "blank": b" \n\n",
+    "cut off": PENDULUM[:300].encode(),
+    "text": b"hello world",
+    "bytes": bytes(range(256)),
+    "page": b"<!doctype html><html><body>404</body></html>",
+}
+
+
+@pytest.mark.parametrize("content", FILES.values(), ids=FILES.keys())
+def test_files_that_are_no_urdf(robot, tmp_path, content):
+    """The message names the file; nothing has changed."""
+    before = state(robot)
+    path = tmp_path / "my robot.urdf"
+    path.write_bytes(content)
+    settings = pendulum_settings(urdf=str(path))
+    for refuse in (lambda: DynaCoM(settings), lambda: robot.initialize(settings)):
+        with pytest.raises(ValueError, match="DynaCoMSettings.urdf.*my robot.urdf'"):
+            refuse()
+    assert_same(state(robot), before)
+
+
+def test_urdf_messages_are_plain(robot, tmp_path):
     """A missing file is told as such, not as a bad robot that contains an error message."""
+    before = state(robot)
     for urdf in ("no/such/file.urdf", str(tmp_path)):
         with pytest.raises(ValueError) as error:
-            DynaCoM(pendulum_settings(urdf=urdf))
+            robot.initialize(pendulum_settings(urdf=urdf))
         assert str(error.value).count("DynaCoMSettings.urdf") == 1
-        assert "not a robot's URDF" not in str(error.value)
+        assert NO_URDF not in str(error.value)
+    assert f"got the directory '{tmp_path}'" in str(error.value)
+    assert_same(state(robot), before)
+
+
+def test_names_with_spaces(tmp_path):
+    """Of files, robots, links and joints, and of contacts."""
+    text = PENDULUM.replace("pendulum", "a long pendulum").replace("bob", "the bob, left")
+    folder = tmp_path / "my robots, é"
+    folder.mkdir()
+    path = folder / "the pendulum.urdf"
+    path.write_text(text, encoding="utf-8")
+    for urdf in (text, str(path)):
+        robot = DynaCoM(pendulum_settings(urdf=urdf))
+        assert robot.getMass() == 5.0
+        assert robot.getModel().name == "a long pendulum"
+        robot.addContact(point(frame_name="the bob, left", mu=1.0), "my contact")
+        robot.computeDynamics(pin.neutral(robot.getModel()), np.zeros(7), np.zeros(7))
+        assert distribute(robot) == SOLVED
+        assert robot.getActiveContacts() == ["my contact"]
 
 
 def test_model_without_mass(robot):
@@ -321,6 +394,7 @@ BEFORE_INITIALIZE = {
     "addContact": lambda robot: robot.addContact(sole(), "a"),
     "addContact6d": lambda robot: robot.addContact6d(sole(), "a"),
     "distributeForce": lambda robot: robot.distributeForce(*np.ones((3, 3))),
+    "distributeForce of NaN": lambda robot: robot.distributeForce(*np.full((3, 3), np.nan)),
 }
 
 
@@ -333,6 +407,31 @@ def test_use_before_initialize(call):
     assert isinstance(error.value, DynacomError)
     robot.initialize(pendulum_settings())
     robot.computeDynamics(pin.neutral(robot.getModel()), np.zeros(7), np.zeros(7))
+
+
+def test_what_works_before_initialize():
+    """Settings are kept; there is nothing to be found yet, and no name is known."""
+    robot = DynaCoM()
+    assert not robot.isInitialized()
+    robot.setGroundHeight(0.5)
+    robot.setMinimalVerticalForce(2.0)
+    robot.setWrenchWeights(np.full(6, 3.0))
+    for name in (*MOTION_GETTERS, "ne_b"):
+        assert np.isnan(getattr(robot, name)()).all(), name
+    assert not robot.isCoPDefined()
+    assert np.isnan(robot.computeWrenchMargin().margin)
+    assert robot.getDistributionStatus() == DistributionStatus.NoContact
+    assert robot.getDistribution().contacts == []
+    assert robot.getKnownContacts() == robot.getActiveContacts() == []
+    for name in ("getContact", "removeContact", *CONTACT_GETTERS):
+        with pytest.raises(ValueError, match="no contact 'a'; known: none"):
+            getattr(robot, name)("a")
+    robot.initialize(pendulum_settings())
+    assert robot.isInitialized()
+    assert robot.getGroundHeight() == 0.5
+    assert robot.getMinimalVerticalForce() == 2.0
+    assert_array_equal(robot.getWrenchWeights(), np.full(6, 3.0))
+    assert_array_equal(robot.getDistribution().wrench_weights, np.full(6, 3.0))
 
 
 def test_computeNL_needs_a_motion(robot):
@@ -352,7 +451,14 @@ def test_before_computeDynamics(robot):
         assert np.isnan(values).all(), name
         assert values.shape == ((2,) if name in ("getCoP", "getVRP", "getNL") else values.shape)
     assert robot.getDistributionStatus() == DistributionStatus.NoContact
+    assert not robot.getDistribution().isOptimal()
+    assert np.isnan(robot.computeWrenchMargin().margin)
+    assert not robot.isCoPDefined()
     assert_array_equal(robot.allForces(), np.zeros(12))
+    for name in "abc":
+        assert np.isnan(robot.getContactCoP(name)).all()
+        assert np.isnan(robot.getContactCoPMargin(name))
+        assert robot.getContactFrictionUsage(name) == robot.getContactYawUsage(name) == 0.0
 
 
 # Dynamics; test_centroidal.py has more of them.
@@ -407,6 +513,12 @@ def test_keywords_and_defaults(robot):
     assert robot.getActiveContacts()[-1] == "d"
     robot.setGroundHeight(groundHeight=0.5)
     assert robot.getGroundHeight() == 0.5
+    robot.setMinimalVerticalForce(minimalVerticalForce=2.0)
+    assert robot.getMinimalVerticalForce() == 2.0
+    robot.setWrenchWeights(weights=np.arange(1, 7))
+    assert_array_equal(robot.getWrenchWeights(), np.arange(1, 7))
+    for name in CONTACT_GETTERS:
+        getattr(robot, name)(name="a")
 
 
 def test_virtual_repellent_point_by_hand():
@@ -461,6 +573,58 @@ def test_ground_height_out_of_range(robot, height):
     with pytest.raises(ValueError, match=f"groundHeight must be finite, got {height:g}"):
         robot.setGroundHeight(height)
     assert robot.getGroundHeight() == -0.5
+
+
+@pytest.mark.parametrize("force", [0.0, -1.0, np.nan, np.inf])
+def test_minimal_vertical_force_out_of_range(robot, force):
+    robot.setMinimalVerticalForce(3.0)
+    message = f"minimalVerticalForce must be finite and > 0 N, got {force:g}"
+    with pytest.raises(ValueError, match=message):
+        robot.setMinimalVerticalForce(force)
+    assert robot.getMinimalVerticalForce() == 3.0
+
+
+@pytest.mark.parametrize("weight", [0.0, -1.0, np.nan, np.inf])
+def test_wrench_weights_out_of_range(robot, weight):
+    robot.setWrenchWeights(np.arange(1, 7))
+    for component in range(6):
+        weights = np.ones(6)
+        weights[component] = weight
+        with pytest.raises(ValueError, match="wrench weights must be finite and > 0, got"):
+            robot.setWrenchWeights(weights)
+    for size in (0, 5, 7):
+        with pytest.raises(ValueError, match=f"weights must have 6 components, got {size}"):
+            robot.setWrenchWeights(np.ones(size))
+    assert_array_equal(robot.getWrenchWeights(), np.arange(1, 7))
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_no_centre_of_pressure_below_the_minimal_vertical_force(talos, talos_standing, flat):
+    """NaN, never an infinity or a former value; the threshold itself is enough."""
+    robot = talos.dynacom()
+    zero = np.zeros(talos.model.nv)
+
+    def fall(force):
+        a = zero.copy()
+        a[2] = force / robot.getMass() - G
+        robot.computeNL(3.0, talos_standing, zero, a, flatHorizontalGround=flat)
+
+    assert robot.getMinimalVerticalForce() == 1.0
+    for force, minimum in ((0.99, 1.0), (0.0, 1.0), (-500.0, 1.0), (49.0, 50.0), (1e-6, 2e-6)):
+        robot.setMinimalVerticalForce(minimum)
+        fall(800.0)
+        assert robot.isCoPDefined()
+        assert np.isfinite(robot.getNL()).all()
+        fall(force)
+        assert not robot.isCoPDefined()
+        assert np.isnan(robot.getCoP()).all()
+        assert np.isnan(robot.getNL()).all()
+        assert np.isfinite(robot.getVRP()).all()
+        for name in robot.getActiveContacts():
+            assert np.isnan(robot.getContactCoP(name)).all() or flat
+    robot.setMinimalVerticalForce(50.0)
+    fall(50.001)
+    assert robot.isCoPDefined()
 
 
 def test_external_wrench_is_about_the_centre_of_mass(talos, talos_standing):
@@ -618,24 +782,110 @@ def test_numbers_of_the_wrong_type(robot, wrong):
     assert_same(state(robot), before)
 
 
-def test_sensor_data_that_is_not_finite(robot):
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("argument", range(4), ids=["q", "v", "a", "extWrench"])
+@pytest.mark.parametrize("flat", [True, False])
+def test_motion_that_is_not_finite(robot, argument, value, flat):
     """A fact of the world, not an exception; the next sample is analysed as if nothing had been."""
-    q, v, a = motion(robot.getModel(), 0)
-    robot.computeDynamics(q, v, a)
+    arguments = [*motion(robot.getModel(), 0), np.zeros(6)]
+
+    def compute(arguments):
+        robot.computeNL(3.0, *arguments, flatHorizontalGround=flat)
+
+    compute(arguments)
     distribute(robot)
     before = state(robot)
-    for broken in ((np.nan * q, v, a), (q, np.inf * v, a), (q, v, np.nan * a)):
-        robot.computeDynamics(*broken)
-        assert np.isnan(robot.getCoP()).all()
-        assert distribute(robot) == DistributionStatus.NumericalFailure
-        assert_array_equal(robot.allForces(), np.zeros(12))
-        robot.computeDynamics(*broken, flatHorizontalGround=False)
-        assert robot.getDistributionStatus() == DistributionStatus.NumericalFailure
-        assert np.isnan(robot.getCoP()).all()
-        assert_array_equal(robot.allForces(), np.zeros(12))
-    robot.computeDynamics(q, v, a)
+    for component in range(arguments[argument].size):
+        broken = [array.copy() for array in arguments]
+        broken[argument][component] = value
+        status = robot.getDistributionStatus()
+        compute(broken)
+        for name in MOTION_GETTERS:
+            assert np.isnan(getattr(robot, name)()).all(), name
+        assert not robot.isCoPDefined()
+        # Only on uneven ground there was a distribution; be that as it may, forces are kept.
+        assert robot.getDistributionStatus() == (status if flat else INVALID)
+        assert_array_equal(robot.allForces(), before["allForces"])
+        assert distribute(robot) == robot.getDistributionStatus() == INVALID
+        assert_array_equal(robot.allForces(), before["allForces"])
+        assert not robot.getDistribution().isOptimal()
+        assert np.isnan(robot.computeWrenchMargin().margin)
+        assert np.isnan(robot.getFeasibleACoM()).all()
+    compute(arguments)
     distribute(robot)
     assert_same(state(robot), before)
+
+
+def test_motion_beyond_the_largest_numbers(robot):
+    """Finite numbers may become others."""
+    q, v, a = motion(robot.getModel(), 0)
+    robot.computeDynamics(q, 1e200 * v, a)
+    for name in MOTION_GETTERS:
+        assert np.isnan(getattr(robot, name)()).all(), name
+    assert distribute(robot) == INVALID
+    robot.computeDynamics(q, v, a)
+    assert np.isfinite(robot.getGroundCoMTorque()).all()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("argument", range(3), ids=["groundCoMForce", "groundCoMTorque", "com"])
+def test_distribution_of_what_is_not_finite(robot, argument, value):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    arguments = [robot.getGroundCoMForce(), robot.getGroundCoMTorque(), robot.getCoM()]
+    assert robot.distributeForce(*arguments) == SOLVED
+    before = state(robot)
+    for component in range(3):
+        broken = [array.copy() for array in arguments]
+        broken[argument][component] = value
+        assert robot.distributeForce(*broken) == robot.getDistributionStatus() == INVALID
+        assert_array_equal(robot.allForces(), before["allForces"])
+        for name in "ab":
+            force = robot.getContact(name).appliedForce()
+            assert_array_equal(force, before[f"{name}.appliedForce"])
+    assert robot.distributeForce(*arguments) == SOLVED
+    assert_same(state(robot), before)
+
+
+CHANGES = {
+    "nothing": lambda robot: None,
+    "another motion": lambda robot: robot.computeDynamics(*motion(robot.getModel(), 1)),
+    "an idle contact": lambda robot: robot.addContact(sole_of(robot.getModel(), "d"), "d", False),
+    "mu": lambda robot: robot.getContact("a").setMu(3.0),
+    "weights": lambda robot: robot.getContact("b").setForceWeights(np.full(3, 2.0)),
+    "frame": lambda robot: move(robot.getContact("a"), FRAMES["d"]),
+    "deactivated": lambda robot: robot.deactivateContact("a"),
+    "activated": lambda robot: robot.activateContact("c"),
+    "removed": lambda robot: robot.removeContact("b"),
+    "added": lambda robot: robot.addContact(sole_of(robot.getModel(), "d"), "d"),
+    "again": lambda robot: (robot.deactivateContact("a"), robot.activateContact("a")),
+    "norm": lambda robot: robot.setWrenchWeights(np.full(6, 2.0)),
+}
+
+
+def move(contact: Contact6D, frame: str) -> None:
+    settings = contact.getSettings()
+    settings.frame_name = frame
+    contact.initialize(settings)
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_forces_without_an_answer(robot, change):
+    """Those of the last one, as long as contacts and their settings are the same."""
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    assert distribute(robot) == SOLVED
+    kept = robot.allForces()
+    CHANGES[change](robot)
+    com = robot.getCoM()
+    for _ in range(2):
+        assert robot.distributeForce(np.full(3, np.nan), np.zeros(3), com) == INVALID
+        forces = robot.allForces()
+        if change in ("nothing", "another motion", "an idle contact"):
+            assert_array_equal(forces, kept)
+        else:
+            assert_array_equal(forces, np.zeros(6 * len(robot.getActiveContacts())))
+        assert_array_equal(robot.getDistribution().forces(), forces)
+    assert distribute(robot) in (SOLVED, RELAXED)
+    assert robot.getDistribution().isOptimal()
 
 
 # Pinocchio's objects, and lifetimes.
@@ -768,10 +1018,8 @@ def test_setters_of_a_shared_contact_act_on_the_next_call(robot):
     contact.initialize(contact.getSettings())
     distribute(robot)
     assert_allclose(robot.allForces(), with_setters, rtol=0, atol=1e-9)
-    expected = [robot.getContact("a"), contact]
-    assert_allclose(
-        with_setters, cheapest_forces(expected, robot.ne_b()), rtol=0, atol=1e-6
-    ) if robot.getDistributionStatus() == SOLVED else assert_array_equal(with_setters, 0)
+    expected = share_by_edges([robot.getContact("a"), contact], robot.ne_b())
+    assert_allclose(with_setters, expected.forces, rtol=0, atol=1e-6)
 
 
 def test_contact_of_another_frame_on_the_next_call(robot):
@@ -924,6 +1172,7 @@ def test_contacts_that_cannot_be_added(robot, add):
         "activateContact6d",
         "deactivateContact6d",
         "getContact",
+        *CONTACT_GETTERS,
     ],
 )
 def test_names_that_are_not_known(robot, name):
@@ -1041,6 +1290,9 @@ def test_any_order_of_operations(operations):
             assert robot.getContact(known) is contact
 
     status = distribute(robot)
+    result = robot.getDistribution()
+    assert len(result.contacts) == len(active)
+    assert result.isOptimal()
     ordered = [contacts[name] for name in active]
     if not active:
         assert status == DistributionStatus.NoContact
@@ -1118,34 +1370,243 @@ def test_distribution_is_the_quadratic_program(seed):
     assert status == robot.getDistributionStatus() == SOLVED
     contacts = [robot.getContact(name) for name in names]
     tolerance = 1e-9 * np.linalg.norm(wrench)
-    expected = cheapest_forces(contacts, wrench)
-    assert_allclose(robot.allForces(), expected, rtol=0, atol=1e3 * tolerance)
+    expected = share_by_edges(contacts, wrench).forces
+    assert_allclose(robot.allForces(), expected, rtol=0, atol=10 * tolerance)
     assert_allclose(robot.ne_A() @ robot.allForces(), wrench, rtol=0, atol=tolerance)
     for contact in contacts:
         assert_within_cones(contact, tolerance)
 
 
-def test_forces_are_zero_unless_solved(robot):
+def test_out_of_reach(robot):
+    """Forces are the best that the contacts can give, and the result says what is missing."""
     robot.computeDynamics(*motion(robot.getModel(), 0))
     com = robot.getCoM()
-    normal = robot.getContact("a").getPose().rotation[:, 2]
-    push = robot.getContact("a").ne_A() @ [0, 0, 100, 0, 0, 0]
+    contact = robot.getContact("a")
+    push = contact.ne_A() @ [0, 0, 100, 0, 0, 0]
     robot.deactivateContact("b")
     assert robot.distributeForce(push[:3], push[3:], com) == SOLVED
     assert_allclose(robot.allForces(), [0, 0, 100, 0, 0, 0], rtol=0, atol=1e-10)
 
-    status = robot.distributeForce(-100 * normal, push[3:], com)
-    assert status == robot.getDistributionStatus() == DistributionStatus.Infeasible
-    assert_array_equal(robot.allForces(), np.zeros(6))
-    assert_array_equal(robot.ne_b(), np.concatenate([-100 * normal, push[3:]]))
+    pull = np.concatenate([-push[:3], push[3:]])
+    status = robot.distributeForce(pull[:3], pull[3:], com)
+    assert status == robot.getDistributionStatus() == RELAXED
+    result = robot.getDistribution()
+    expected = share_by_edges([contact], pull)
+    assert_array_equal(robot.ne_b(), pull)
+    assert_array_equal(result.wrench, pull)
+    assert_allclose(result.achieved, expected.closest, rtol=0, atol=1e-9)
+    assert_allclose(robot.allForces(), expected.forces, rtol=0, atol=1e-8)
+    assert_array_equal(result.residual, pull - result.achieved)
+    assert_array_equal(contact.appliedForce(), robot.allForces())
+    assert_within_cones(contact, 1e-9)
+    assert result.isOptimal()
+    assert robot.computeWrenchMargin().margin == 0.0
 
-    assert robot.distributeForce(push[:3], push[3:], com) == SOLVED
     robot.deactivateContact("a")
     status = robot.distributeForce(push[:3], push[3:], com)
     assert status == robot.getDistributionStatus() == DistributionStatus.NoContact
     assert robot.allForces().shape == (0,)
+    assert_array_equal(robot.getDistribution().achieved, np.zeros(6))
     for name in "abc":
         assert not robot.getContact(name).appliedForce().any()
+
+
+def test_wrench_weights_choose_the_closest(robot):
+    """What counts more is kept better."""
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    contacts = [robot.getContact(name) for name in "ab"]
+    for contact in contacts:
+        contact.setMu(0.3)
+        contact.setGu(0.1)
+    asked = np.array([3000.0, -2000.0, 100.0, 50.0, -60.0, 900.0])
+    residuals = {}
+    for weights in ([1, 1, 1, 1, 1, 1], [100, 100, 100, 1, 1, 1], [1, 1, 1, 100, 100, 100]):
+        weights = np.array(weights, dtype=float)
+        robot.setWrenchWeights(weights)
+        assert robot.distributeForce(asked[:3], asked[3:], robot.getCoM()) == RELAXED
+        result = robot.getDistribution()
+        assert_array_equal(result.wrench_weights, weights)
+        expected = share_by_edges(contacts, asked, weights)
+        scale = np.linalg.norm(weights * asked)
+        assert_allclose(
+            weights * result.achieved, weights * expected.closest, rtol=0, atol=1e-9 * scale
+        )
+        residuals[tuple(weights[[0, 3]])] = np.linalg.norm(result.residual.reshape(2, 3), axis=1)
+    assert residuals[100, 1][0] < residuals[1, 1][0] < residuals[1, 100][0]
+    assert residuals[1, 100][1] < residuals[1, 1][1] < residuals[100, 1][1]
+
+
+def test_the_scale_is_the_weight(robot):
+    """Of any robot at 9.81 m/s², if the wrench is less: rounding is not a pull."""
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    robot.deactivateContact("b")
+    weight = G * robot.getMass()
+    rounding = -1e-9 * weight * robot.getContact("a").getPose().rotation[:, 2]
+    assert robot.distributeForce(rounding, np.zeros(3), robot.getCoM()) == SOLVED
+    assert_allclose(robot.getDistribution().scale, weight, rtol=1e-14)
+    assert robot.distributeForce(1e3 * rounding, np.zeros(3), robot.getCoM()) == RELAXED
+    robot.deactivateContact("a")
+    assert robot.distributeForce(rounding, np.zeros(3), robot.getCoM()) == SOLVED
+    status = robot.distributeForce(1e3 * rounding, np.zeros(3), robot.getCoM())
+    assert status == DistributionStatus.NoContact
+
+
+def test_distribution_is_a_copy(robot):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    assert distribute(robot) == SOLVED
+    held = robot.getDistribution()
+    forces = held.forces()
+    robot.getDistribution().achieved[:] = 9.0
+    robot.getDistribution().contacts[0].force[:] = 9.0
+    assert_array_equal(robot.getDistribution().forces(), forces)
+    robot.distributeForce(np.ones(3), np.zeros(3), robot.getCoM())
+    robot.removeContact("a")
+    del robot
+    gc.collect()
+    assert_array_equal(held.forces(), forces)
+    assert held.isOptimal()
+
+
+def test_distribution_is_in_the_order_of_activation(robot):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    robot.activateContact("c")
+    robot.deactivateContact("a")
+    robot.activateContact("a")
+    assert robot.getActiveContacts() == ["b", "c", "a"]
+    assert distribute(robot) == SOLVED
+    result = robot.getDistribution()
+    assert_array_equal(result.forces(), robot.allForces())
+    for name, share in zip("bca", result.contacts, strict=True):
+        contact = robot.getContact(name)
+        assert_array_equal(share.force, contact.appliedForce())
+        assert_array_equal(share.NE, contact.ne_A())
+        assert_array_equal(share.weights, contact.reg_A())
+
+
+@CALM
+@given(st.integers(0, 2**32 - 1))
+def test_feasible_accelerations(seed):
+    """By Newton and Euler from what is achieved: those of the motion where all of it is."""
+    rng = np.random.default_rng(seed)
+    model = random_humanoid(0)
+    robot = DynaCoM(model)
+    for name in "ab":
+        robot.addContact(sole_of(model, name), name)
+    q, v, a = motion(model, seed % 1000)
+    pushed = rng.uniform(-50.0, 50.0, 6)
+    robot.computeNL(3.0, q, v, a, pushed)
+    assert np.isnan(robot.getFeasibleACoM()).all()
+    assert np.isnan(robot.getFeasibleAMVariation()).all()
+    vrp = robot.getVRP()
+    assert_allclose(vrp, (robot.getCoM() - robot.getACoM() / 9.0)[:2], rtol=1e-12)
+
+    status = distribute(robot)
+    force, torque = np.split(robot.getDistribution().achieved + pushed, 2)
+    acom = force / robot.getMass() - G * UP
+    assert_allclose(robot.getFeasibleACoM(), acom, rtol=1e-12, atol=1e-12)
+    assert_allclose(robot.getFeasibleAMVariation(), torque, rtol=1e-12, atol=1e-12)
+    scale = robot.getDistribution().scale
+    differs = np.abs(acom - robot.getACoM()).max() * robot.getMass()
+    differs += np.abs(torque - robot.getAMVariation()).max()
+    assert (differs <= 1e-6 * scale) == (status == SOLVED)
+    # A distribution by hand leaves computeNL() as it is; one of computeDynamics() does not.
+    robot.computeNL(3.0)
+    assert_array_equal(robot.getVRP(), vrp)
+    robot.computeNL(3.0, q, v, a, pushed, False)
+    assert_allclose(robot.getFeasibleACoM(), acom, rtol=1e-12, atol=1e-12)
+    assert_allclose(robot.getVRP(), (robot.getCoM() - acom / 9.0)[:2], rtol=1e-9, atol=1e-9)
+    if robot.isCoPDefined():
+        assert_array_equal(robot.getNL(), robot.getCoP() - robot.getVRP())
+
+
+def test_feasible_accelerations_in_flight(robot):
+    """Without contacts: free fall, whatever the motion says."""
+    model = robot.getModel()
+    for name in "ab":
+        robot.deactivateContact(name)
+    robot.computeDynamics(*motion(model, 0), flatHorizontalGround=False)
+    assert robot.getDistributionStatus() == DistributionStatus.NoContact
+    assert_allclose(robot.getFeasibleACoM(), -G * UP, rtol=1e-15)
+    assert_array_equal(robot.getFeasibleAMVariation(), np.zeros(3))
+
+
+def test_usage_and_margin_of_a_contact_by_hand(robot):
+    """A force within the limits: how much of each it uses."""
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    contact = robot.getContact("a")
+    robot.deactivateContact("b")
+    settings = contact.getSettings()
+    settings.mu, settings.gu, settings.half_length, settings.half_width = 0.5, 0.2, 0.1, 0.05
+    contact.initialize(settings)
+    robot.distributeForce(np.zeros(3), np.zeros(3), robot.getCoM())
+    wrench = contact.ne_A() @ [10.0, -40.0, 100.0, 3.0, -6.0, -5.0]
+    assert robot.distributeForce(wrench[:3], wrench[3:], robot.getCoM()) == SOLVED
+    # The centre of pressure: x = -tau_y/f_z, y = tau_x/f_z.
+    assert_allclose(robot.getContactCoP("a"), [0.06, 0.03], rtol=1e-9)
+    assert robot.getContactCoPMargin("a") == pytest.approx(0.02, rel=1e-8)
+    assert robot.getContactFrictionUsage("a") == pytest.approx(0.8, rel=1e-9)
+    assert robot.getContactYawUsage("a") == pytest.approx(0.25, rel=1e-9)
+    for name, getter in (
+        ("getContactCoP", contact.getCoP),
+        ("getContactCoPMargin", contact.getCoPMargin),
+        ("getContactFrictionUsage", contact.getFrictionUsage),
+        ("getContactYawUsage", contact.getYawUsage),
+    ):
+        assert_array_equal(getattr(robot, name)("a"), getter())
+    # Out of reach, forces are on a limit; what is used up is used up.
+    wrench = contact.ne_A() @ [500.0, 0.0, 100.0, 0.0, 0.0, 0.0]
+    assert robot.distributeForce(wrench[:3], wrench[3:], robot.getCoM()) == RELAXED
+    assert robot.getContactFrictionUsage("a") == pytest.approx(1.0, rel=1e-9)
+    # Below the minimal force there is none, and a contact that takes no part has none either.
+    robot.setMinimalVerticalForce(1e4)
+    for name in "ab":
+        assert robot.getContactCoP(name).shape == (2,)
+        assert np.isnan(robot.getContactCoP(name)).all()
+        assert np.isnan(robot.getContactCoPMargin(name))
+        assert robot.getContactFrictionUsage(name) == 0.0
+        assert robot.getContactYawUsage(name) == 0.0
+
+
+def test_usage_of_points(humanoid):
+    """A point has its centre of pressure, but no edges and no yaw; without friction, no usage."""
+    robot = DynaCoM(humanoid)
+    robot.addContact(point(frame_name=FRAMES["a"], mu=0.5), "a")
+    robot.computeDynamics(*motion(humanoid, 0))
+    contact = robot.getContact("a")
+    wrench = contact.ne_A() @ [10.0, -20.0, 100.0]
+    assert robot.distributeForce(wrench[:3], wrench[3:], robot.getCoM()) == SOLVED
+    assert_array_equal(robot.getContactCoP("a"), np.zeros(2))
+    assert robot.getContactFrictionUsage("a") == pytest.approx(0.4, rel=1e-9)
+    assert np.isnan(robot.getContactCoPMargin("a"))
+    assert np.isnan(robot.getContactYawUsage("a"))
+    contact.setMu(0.0)
+    robot.distributeForce(wrench[:3], wrench[3:], robot.getCoM())
+    assert np.isnan(robot.getContactFrictionUsage("a"))
+
+
+def test_margin_of_the_wrench(resting):
+    """The class's and that of a distribution of the same contacts and wrench."""
+    distribution = dynacom.WrenchDistribution()
+    weights = np.array([1.0, 1.0, 1.0, 5.0, 5.0, 5.0])
+    resting.setWrenchWeights(weights)
+    distribution.setWrenchWeights(weights)
+    assert distribute(resting) == SOLVED
+    for name in resting.getActiveContacts():
+        distribution.add(resting.getContact(name))
+    distribution.solve(resting.ne_b(), G * resting.getMass())
+    margin, expected = resting.computeWrenchMargin(), distribution.computeMargin()
+    assert isinstance(margin, dynacom.WrenchMargin)
+    assert (margin.margin, margin.axis, margin.sign) == (
+        expected.margin,
+        expected.axis,
+        expected.sign,
+    )
+    assert isinstance(margin.margin, float)
+    assert 0.0 < margin.margin < G * resting.getMass()
+    # A lean of the centre of mass takes of it.
+    force, torque = np.split(resting.ne_b(), 2)
+    resting.distributeForce(force, torque, resting.getCoM() + [0.05, 0.0, 0.0])
+    assert resting.computeWrenchMargin().margin < margin.margin
 
 
 # Talos at rest.
@@ -1207,20 +1668,27 @@ def test_both_centres_of_pressure_agree_on_flat_ground(talos, talos_standing, le
     rng = np.random.default_rng(0)
     robot = talos.dynacom()
     compared = 0
-    for _ in range(20):
+    for number in range(20):
         v, a = 0.3 * rng.standard_normal((2, talos.model.nv))
+        a *= 20.0 if number % 4 == 0 else 1.0  # too much for the soles
         q = talos_standing.copy()
         q[2] += lean
         robot.setGroundHeight(lean)
         robot.computeDynamics(q, v, a)
         flat = robot.getCoP()
         robot.computeDynamics(q, v, a, flatHorizontalGround=False)
+        assert robot.isCoPDefined()
         if robot.getDistributionStatus() == SOLVED:
             assert_allclose(robot.getCoP(), flat, rtol=0, atol=1e-8)
             compared += 1
         else:
-            assert np.isnan(robot.getCoP()).all()
-    assert compared >= 10
+            # That of what the contacts can give is beneath the soles, which the other is not.
+            assert robot.getDistributionStatus() == RELAXED
+            achieved = dynacom.CentroidalWrench()
+            achieved.force, achieved.torque = np.split(robot.getDistribution().achieved, 2)
+            expected = dynacom.computeFlatGroundCoP(achieved, robot.getCoM(), lean)
+            assert_allclose(robot.getCoP(), expected, rtol=0, atol=1e-8)
+    assert 10 <= compared < 20
 
 
 def test_centre_of_the_pressures_on_stairs(talos, talos_standing):
@@ -1283,7 +1751,7 @@ BINDINGS = [
     if getattr(getattr(dynacom, name), "__module__", None) == DynaCoM.__module__
 ]
 CLASSES = [item for item in BINDINGS if inspect.isclass(item)]
-CLASSES += [dynacom.MotionAnalysis.Contact]
+CLASSES += [dynacom.MotionAnalysis.Contact, dynacom.DistributionResult.Contact]
 # Of enums, what Boost.Python gives them all.
 INHERITED = {"names", "values"}
 
@@ -1329,7 +1797,7 @@ HEADERS = {
     "contact_base.hpp": ("ContactBase",),
     "contact_point.hpp": ("ContactPointSettings", "ContactPoint"),
     "contact6d.hpp": ("Contact6DSettings", "Contact6D"),
-    "wrench_distribution.hpp": ("WrenchDistribution",),
+    "wrench_distribution.hpp": ("DistributionResult", "WrenchDistribution"),
     "dyna_com.hpp": ("DynaCoMSettings", "DynaCoM"),
 }
 

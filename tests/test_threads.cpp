@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: BSD-2-Clause
+// A thread takes a copy of a DynaCoM, and shares nothing. `scripts/test --sanitize` runs this with
+// ThreadSanitizer, too.
+#define BOOST_TEST_MODULE threads
+#include <atomic>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "dynacom/contact6d.hpp"
+#include "dynacom/contact_point.hpp"
+#include "dynacom/motion.hpp"
+#include "random_robot.hpp"
+
+using namespace dynacom;
+using namespace dynacom_tests;
+
+namespace {
+
+constexpr std::size_t kThreads = 8;
+constexpr int kFrames = 60;
+
+/// All numbers that came out, in the order in which they did.
+using Numbers = std::vector<double>;
+
+void append(Numbers& numbers, const Eigen::Ref<const MatrixXd>& values) {
+  for (Index col = 0; col < values.cols(); ++col)
+    for (Index row = 0; row < values.rows(); ++row) numbers.push_back(values(row, col));
+}
+
+/// Bit for bit, so that a NaN is the same as itself, and 0 is not −0.
+bool sameBits(const Numbers& one, const Numbers& other) {
+  return one.size() == other.size() &&
+         std::memcmp(one.data(), other.data(), one.size() * sizeof(double)) == 0;
+}
+
+/// Calls an action with 0 ... 7, each in a thread of its own, and all of them at once.
+void inThreads(const std::function<void(std::size_t)>& action) {
+  std::atomic<std::size_t> ready{0};
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < kThreads; ++i)
+    threads.emplace_back([&, i] {
+      ++ready;
+      while (ready < kThreads) std::this_thread::yield();
+      action(i);
+    });
+  for (std::thread& thread : threads) thread.join();
+}
+
+/// A robot on two soles and two points, that has moved and has forces already.
+DynaCoM makeRobot() {
+  Random random(1);
+  const auto model = standingRobot(random, stance(4));
+  DynaCoM robot(model);
+  for (int i = 0; i < 4; ++i) {
+    const std::string frame = "sole" + std::to_string(i);
+    if (i < 2) {
+      Contact6DSettings settings;
+      settings.mu = 0.7;
+      settings.gu = 0.1;
+      settings.half_length = 0.1;
+      settings.half_width = 0.06;
+      settings.frame_name = frame;
+      robot.addContact(std::make_shared<Contact6D>(settings), frame);
+    } else {
+      ContactPointSettings settings;
+      settings.mu = 0.7;
+      settings.frame_name = frame;
+      robot.addContact(std::make_shared<ContactPoint>(settings), frame);
+    }
+  }
+  robot.setGroundHeight(-0.1);
+  robot.setWrenchWeights((Vector6() << 1., 1., 1., 2., 2., 2.).finished());
+  const State x = restState(model);
+  robot.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
+  return robot;
+}
+
+void appendResults(Numbers& numbers, DynaCoM& robot) {
+  for (const Vector3d& value :
+       {robot.getGroundCoMForce(), robot.getGroundCoMTorque(), robot.getCoM(), robot.getVCoM(),
+        robot.getACoM(), robot.getAM(), robot.getAMVariation(), robot.getFeasibleACoM(),
+        robot.getFeasibleAMVariation()})
+    append(numbers, value);
+  for (const Vector2d& value : {robot.getCoP(), robot.getVRP(), robot.getNL()})
+    append(numbers, value);
+  append(numbers, robot.allForces());
+  append(numbers, robot.ne_A());
+  const DistributionResult& result = robot.getDistribution();
+  for (const Vector6& value :
+       {result.wrench, result.achieved, result.residual, result.wrench_multipliers})
+    append(numbers, value);
+  for (const DistributionResult::Contact& contact : result.contacts) {
+    append(numbers, contact.multipliers);
+    append(numbers, contact.relaxation_multipliers);
+  }
+  numbers.insert(numbers.end(), {static_cast<double>(result.status), result.cost, result.scale,
+                                 static_cast<double>(result.iterations)});
+  for (const std::string& name : robot.getKnownContacts()) {
+    append(numbers, robot.getContact(name)->getPose().toHomogeneousMatrix());
+    append(numbers, robot.getContactCoP(name));
+    numbers.insert(numbers.end(),
+                   {robot.getContactFrictionUsage(name), robot.getContactCoPMargin(name),
+                    robot.getContactYawUsage(name)});
+  }
+}
+
+/// A motion of its own for each seed, in which everything happens that a controller does.
+Numbers work(DynaCoM robot, unsigned seed) {
+  Random random(seed);
+  Numbers numbers;
+  const std::vector<std::string> names = robot.getKnownContacts();
+  for (int frame = 0; frame < kFrames; ++frame) {
+    State x = randomState(robot.getModel(), random, 0.05);
+    if (frame % 20 == 7) x.a[0] = std::numeric_limits<double>::quiet_NaN();
+    robot.computeNL(3., x.q, x.v, x.a, random.vector(6, 5.), random.coin());
+    appendResults(numbers, robot);
+
+    // Wrenches in and out of reach.
+    Vector3d force = random.vector3(300.);
+    force.z() += 300.;
+    robot.distributeForce(force, random.vector3(20.), comOf(robot.getModel(), x.q));
+    appendResults(numbers, robot);
+    if (frame % 10 == 0) {
+      const WrenchMargin margin = robot.computeWrenchMargin();
+      numbers.insert(numbers.end(), {margin.margin, static_cast<double>(margin.axis),
+                                     static_cast<double>(margin.sign)});
+    }
+
+    // Contacts come and go, and change.
+    const std::string& name = names[static_cast<std::size_t>(random.integer(0, 3))];
+    const auto contact = robot.getContact(name);
+    switch (random.integer(0, 3)) {
+      case 0:
+        robot.deactivateContact(name);
+        break;
+      case 1:
+        robot.activateContact(name);
+        break;
+      case 2:
+        robot.removeContact(name);
+        robot.addContact(contact, name);
+        break;
+      default:
+        if (const auto sole = std::dynamic_pointer_cast<Contact6D>(contact))
+          sole->setMu(random.uniform(0.3, 0.9));
+        robot.setMinimalVerticalForce(random.uniform(1., 100.));
+    }
+    if (frame % 20 == 19) robot = DynaCoM(robot);
+  }
+  return numbers;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(copies_in_threads_do_what_they_do_one_after_the_other) {
+  const DynaCoM robot = makeRobot();
+  std::vector<Numbers> serial, parallel(kThreads);
+  for (unsigned i = 0; i < kThreads; ++i) serial.push_back(work(robot, i));
+
+  std::vector<DynaCoM> copies(kThreads, robot);
+  inThreads(
+      [&](std::size_t i) { parallel[i] = work(std::move(copies[i]), static_cast<unsigned>(i)); });
+  for (std::size_t i = 0; i < kThreads; ++i) {
+    BOOST_TEST(sameBits(parallel[i], serial[i]));
+    // The motions are not all one.
+    BOOST_TEST(!sameBits(serial[i], serial[(i + 1) % kThreads]));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(threads_may_copy_from_one_original) {
+  const DynaCoM robot = makeRobot();
+  const DynaCoM untouched(robot);
+  std::vector<Numbers> parallel(kThreads);
+  inThreads([&](std::size_t i) { parallel[i] = work(robot, static_cast<unsigned>(i)); });
+  for (unsigned i = 0; i < kThreads; ++i) BOOST_TEST(sameBits(parallel[i], work(untouched, i)));
+}
+
+BOOST_AUTO_TEST_CASE(threads_may_analyze_motions_of_one_robot) {
+  const DynaCoM robot = makeRobot();
+  const auto analyze = [&](std::size_t i) {
+    Random random(static_cast<unsigned>(i));
+    const auto& model = robot.getModel();
+    Motion motion;
+    motion.time = VectorXd::LinSpaced(kFrames, 0., 1.);
+    motion.q.resize(model.nq, kFrames);
+    motion.v.resize(model.nv, kFrames);
+    motion.a.resize(model.nv, kFrames);
+    ContactSchedule schedule{robot.getKnownContacts(), ContactSchedule::Matrix(4, kFrames)};
+    for (Index frame = 0; frame < kFrames; ++frame) {
+      const State x = randomState(model, random, 0.05);
+      motion.q.col(frame) = x.q;
+      motion.v.col(frame) = x.v;
+      motion.a.col(frame) = x.a;
+      for (Index k = 0; k < 4; ++k) schedule.active(k, frame) = random.coin();
+    }
+    AnalysisSettings settings;
+    settings.flat_horizontal_ground = i % 2 == 0;
+    const MotionAnalysis analysis = analyzeMotion(robot, motion, schedule, settings);
+    Numbers numbers;
+    append(numbers, analysis.residual);
+    append(numbers, analysis.cop);
+    append(numbers, analysis.nl);
+    for (const auto& contact : analysis.contacts) append(numbers, contact.wrench);
+    return numbers;
+  };
+  std::vector<Numbers> parallel(kThreads);
+  inThreads([&](std::size_t i) { parallel[i] = analyze(i); });
+  for (std::size_t i = 0; i < kThreads; ++i) BOOST_TEST(sameBits(parallel[i], analyze(i)));
+}
+
+BOOST_AUTO_TEST_CASE(threads_may_read_robots_at_once) {
+  // The parser has one output for the whole process, so that this is less obvious than it looks.
+  DynaCoMSettings good, bad;
+  good.urdf =
+      R"(<robot name="ball"><link name="ball"><inertial><mass value="2.5"/><inertia
+      ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link></robot>)";
+  bad.urdf = R"(<robot name="ball"><link name="ball"><inertial>)";
+  std::vector<double> masses(kThreads);
+  std::vector<int> refused(kThreads);
+  inThreads([&](std::size_t i) {
+    for (int repetition = 0; repetition < 20; ++repetition) {
+      DynaCoM robot(good);
+      try {
+        robot.initialize(bad);
+      } catch (const std::invalid_argument&) {
+        ++refused[i];
+      }
+      masses[i] = robot.getMass();
+    }
+  });
+  for (std::size_t i = 0; i < kThreads; ++i) {
+    BOOST_TEST(masses[i] == 2.5);
+    BOOST_TEST(refused[i] == 20);
+  }
+}
