@@ -21,16 +21,26 @@ int iterationLimit(Eigen::Index inequalities) { return 50 + 10 * static_cast<int
 
 }  // namespace
 
+void MinimumNorm::reserve(Eigen::Index n, Eigen::Index p, Eigen::Index m) {
+  if (qr_.rows() != n || qr_.cols() != p) qr_ = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(n, p);
+  J_.resize(n, n);
+  R_.resize(n, n);
+  for (Eigen::VectorXd* vector : {&rhs_, &x_, &u_, &Jn_, &r_, &workspace_}) vector->resize(n);
+  y_.resize(p);
+  z_.resize(m);
+  slack_.resize(m);
+  active_.reserve(n);
+  implied_.reserve(m);
+}
+
 MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& E,
                                        const Eigen::Ref<const Eigen::VectorXd>& d,
                                        const Eigen::Ref<const Eigen::MatrixXd>& G,
                                        const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance,
                                        double dependent) {
   iterations_ = 0;
-  y_.resize(E.cols());
-  z_.resize(G.cols());
+  reserve(E.rows(), E.cols(), G.cols());
   implied_.clear();
-  implied_.reserve(G.cols());
   startWithEqualities(E, d);
   const Status status = activateViolated(G, h, tolerance, dependent);
   readMultipliers();
@@ -98,17 +108,7 @@ MinimumNorm::Status MinimumNorm::activateViolated(const Eigen::Ref<const Eigen::
 // x becomes the point of least norm under the equalities, of which only independent ones are kept.
 void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E,
                                       const Eigen::Ref<const Eigen::VectorXd>& d) {
-  const Eigen::Index n = E.rows();
-  J_.resize(n, n);
-  R_.resize(n, n);
-  rhs_.resize(n);
-  x_.resize(n);
-  u_.resize(n);
-  Jn_.resize(n);
-  r_.resize(n);
-  workspace_.resize(n);
   active_.clear();
-  active_.reserve(n);
   complete_ = false;
 
   q_ = equalities_ = 0;

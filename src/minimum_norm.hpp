@@ -22,6 +22,9 @@ class MinimumNorm {
  public:
   enum class Status { Solved, Infeasible, IterationLimit };
 
+  /// Gets the storage for problems of these sizes, as solve() does itself.
+  void reserve(Eigen::Index n, Eigen::Index p, Eigen::Index m);
+
   /// Solves the problem.
   /// @param E, d       equalities, n × p and p; the columns of E have about unit length, or they
   ///                   are zero, up to rounding

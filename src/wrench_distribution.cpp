@@ -23,7 +23,10 @@ using NewtonEuler = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
 // A wrench no farther than this from what the contacts can give is within reach.
 constexpr double kReach = 1e-8;
+// What part of an inequality's normal outside the span of the active ones is none: at the first
+// attempt, and at the last.
 constexpr double kNearlyDependent = 1e-8;
+constexpr double kDependentInequality = 1e-12;
 // By how much the solver may leave an inequality behind.
 constexpr double kTolerance = 1e-12;
 // How far an answer may be from its wrench and from its inequalities: at the first attempt, and
@@ -206,10 +209,11 @@ struct WrenchDistribution::Workspace {
 
   Contact& nextContact();
   void takeProblem();
+  void reserve();
   void assemble(Program& program, const Vector6& row_weights, double slack);
   void assembleCheapest(Program& program, double slack);
   void assembleClosest(double proximity);
-  bool minimizeCost(const Vector6& wrench);
+  bool minimizeCost(const Vector6& wrench, double dependent, double inequality);
   bool minimizeCostOnFace(const Vector6& wrench, double tolerance);
   bool relax(const Vector6& target);
   void extrapolate();
@@ -227,7 +231,10 @@ struct WrenchDistribution::Workspace {
 WrenchDistribution::WrenchDistribution() : work_(std::make_unique<Workspace>()) {}
 WrenchDistribution::WrenchDistribution(const WrenchDistribution& other)
     : work_(std::make_unique<Workspace>(*other.work_)) {}
-WrenchDistribution::WrenchDistribution(WrenchDistribution&&) noexcept = default;
+WrenchDistribution::WrenchDistribution(WrenchDistribution&& other) noexcept
+    : WrenchDistribution() {  // the other can be used again
+  std::swap(work_, other.work_);
+}
 WrenchDistribution& WrenchDistribution::operator=(WrenchDistribution other) noexcept {
   std::swap(work_, other.work_);
   return *this;
@@ -301,6 +308,34 @@ void WrenchDistribution::Workspace::takeProblem() {
   }
 }
 
+// Gets the storage for what this problem does not need, but the next one of its sizes may.
+void WrenchDistribution::Workspace::reserve() {
+  if (scaled.size() == n && relaxation_multipliers.size() == m) return;
+  for (Program* program : {&direct, &slackened}) {
+    const Eigen::Index slacks = program == &slackened ? 6 : 0;
+    program->scales.resize(n);
+    program->E.resize(slacks + n, 6);
+    program->G.resize(slacks + n, m);
+    program->d.resize(6);
+    program->h.resize(m);
+    program->solver.reserve(slacks + n, 6, m);
+  }
+  for (Eigen::VectorXd* vector : {&lambda, &scaled, &change, &gradient, &products})
+    vector->resize(n);
+  for (Eigen::VectorXd* vector : {&relaxation_multipliers, &multipliers}) vector->resize(m);
+  face.resize(n, n);
+  R.resize(n, n);
+  held.resize(n);
+  active.resize(m);
+  for (Contact& contact : result.contacts) {
+    const Eigen::Index rows = contact.A.rows();
+    if (!has_answer) contact.force.setZero(contact.A.cols());
+    contact.active.resize(rows);
+    contact.multipliers.resize(rows);
+    contact.relaxation_multipliers.resize(rows);
+  }
+}
+
 // Fills E and G from the scales. A slack is a variable more for each column of E, with this factor.
 void WrenchDistribution::Workspace::assemble(Program& program, const Vector6& row_weights,
                                              double slack) {
@@ -353,17 +388,17 @@ void WrenchDistribution::Workspace::assembleClosest(double proximity) {
 
 // Finds the cheapest forces that give a wrench, which is over the unit. False if there are none,
 // or hardly any.
-bool WrenchDistribution::Workspace::minimizeCost(const Vector6& wrench) {
+bool WrenchDistribution::Workspace::minimizeCost(const Vector6& wrench, double dependent,
+                                                 double inequality) {
   assembleCheapest(direct, 0.);
   direct.d = wrench.cwiseQuotient(direct.norms);
   direct.h.setZero(m);
   const MinimumNorm::Status status =
-      direct.solver.solve(direct.E, direct.d, direct.G, direct.h, kTolerance, kNearlyDependent);
+      direct.solver.solve(direct.E, direct.d, direct.G, direct.h, kTolerance, dependent);
   iterations += direct.solver.iterations();
   lambda = direct.solver.x().cwiseQuotient(direct.scales);
   // The solver leaves out equalities that depend on others, whether they contradict or not.
-  return status == MinimumNorm::Status::Solved &&
-         passesCheck(wrench, kExactWrench, kExactInequality);
+  return status == MinimumNorm::Status::Solved && passesCheck(wrench, kExactWrench, inequality);
 }
 
 // Does the same on the face of relax(), where equalities and inequalities may all but depend on
@@ -460,7 +495,9 @@ void WrenchDistribution::Workspace::extrapolate() {
 
 // The weighted wrench of forces times their scales.
 Vector6 WrenchDistribution::Workspace::giveScaled(const Eigen::VectorXd& forces) const {
-  return (slackened.E.bottomRows(n).transpose() * forces).cwiseProduct(slackened.norms);
+  Vector6 wrench;
+  wrench.noalias() = slackened.E.bottomRows(n).transpose() * forces;
+  return wrench.cwiseProduct(slackened.norms);
 }
 
 // Where relax() has multiplied an inequality, all forces that come as close to the wrench hold it
@@ -532,7 +569,7 @@ DistributionStatus WrenchDistribution::Workspace::distribute(const Vector6& wren
   held.setConstant(n, -1);
   on_face = false;
   products.resize(n);
-  if (minimizeCost(wrench)) return DistributionStatus::Solved;
+  if (minimizeCost(wrench, kNearlyDependent, kExactInequality)) return DistributionStatus::Solved;
 
   if (!relax(weighted(wrench_weights, wrench))) return DistributionStatus::NumericalFailure;
   on_face = true;
@@ -543,7 +580,12 @@ DistributionStatus WrenchDistribution::Workspace::distribute(const Vector6& wren
       return weighted(wrench_weights, wrench - give(lambda)).norm() <= kReach
                  ? DistributionStatus::Solved
                  : DistributionStatus::Relaxed;
-  return DistributionStatus::NumericalFailure;
+  // Where contacts are nearly parallel, the first attempt may have been too strict.
+  on_face = false;
+  relaxation_multipliers.setZero();
+  return minimizeCost(wrench, kDependentInequality, kAccurateInequality)
+             ? DistributionStatus::Solved
+             : DistributionStatus::NumericalFailure;
 }
 
 bool WrenchDistribution::Workspace::passesCheck(const Vector6& wrench, double reach,
@@ -578,7 +620,8 @@ void WrenchDistribution::Workspace::takeAnswer() {
   const Program& program = on_face ? slackened : direct;
   const MinimumNorm& solver = program.solver;
   result.iterations = iterations;
-  result.wrench_multipliers = -cost_scale * solver.y().cwiseQuotient(program.norms);
+  const Vector6 y = solver.y().cwiseQuotient(program.norms);
+  result.wrench_multipliers = -cost_scale * y;
   multipliers = solver.z();
   gradient.resize(n);
   active.setConstant(m, false);
@@ -595,12 +638,13 @@ void WrenchDistribution::Workspace::takeAnswer() {
     while (size < cols && held[col + size] >= 0) ++size;
     if (size > 0) {
       auto missing = gradient.head(cols);
-      missing.noalias() = contact.NE.transpose() * solver.y().cwiseQuotient(program.norms);
+      missing.noalias() = contact.NE.transpose() * y;
       missing.noalias() += contact.A.transpose() * multipliers.segment(row, rows);
       missing = missing.cwiseQuotient(program.scales.segment(col, cols));
       missing += lambda.segment(col, cols).cwiseProduct(program.scales.segment(col, cols));
       auto of_held = products.head(size);
-      of_held.noalias() = -face.block(col, col, cols, size).transpose() * missing;
+      of_held.noalias() = face.block(col, col, cols, size).transpose() * missing;
+      of_held = -of_held;
       R.block(col, col, size, size).triangularView<Eigen::Upper>().solveInPlace(of_held);
       for (Eigen::Index k = 0; k < size; ++k) {
         multipliers[held[col + k]] = of_held[k];
@@ -642,6 +686,7 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   Workspace& work = *work_;
   DistributionResult& result = work.result;
   work.takeProblem();
+  work.reserve();
   work.iterations = 0;
   result.wrench = wrench;
   const Vector6& weights = work.settings;
