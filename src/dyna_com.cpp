@@ -91,8 +91,8 @@ void DynaCoM::initialize(const pinocchio::Model& model) {
 
 void DynaCoM::setModel(pinocchio::Model&& model, DynaCoMSettings&& settings) {
   const double mass = pinocchio::computeTotalMass(model);
-  if (!(mass > 0.) || !std::isfinite(mass))
-    throwInvalid("the robot '", model.name, "' must have a finite mass > 0, got ", mass);
+  if (!(mass > 0.)) throwInvalid("the robot '", model.name, "' must have a mass > 0, got ", mass);
+  if (std::isinf(mass)) throwInvalid("the robot '", model.name, "' must have a finite mass");
   pinocchio::Data data(model);
   for (Entry& entry : contacts_) entry.contact->deactivate();
   contacts_.clear();

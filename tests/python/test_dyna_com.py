@@ -431,7 +431,6 @@ def test_what_works_before_initialize():
     assert robot.getGroundHeight() == 0.5
     assert robot.getMinimalVerticalForce() == 2.0
     assert_array_equal(robot.getWrenchWeights(), np.full(6, 3.0))
-    assert_array_equal(robot.getDistribution().wrench_weights, np.full(6, 3.0))
 
 
 def test_computeNL_needs_a_motion(robot):
