@@ -79,7 +79,7 @@ def main():
     parser.add_argument("regex", nargs="?", type=re.compile, default=re.compile(""))
     parser.add_argument("--json", type=Path)
     parser.add_argument("--quick", action="store_true")
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     settings = {"repetitions": 9, "min_time": 0.1}
     if arguments.quick:
         settings = {"repetitions": 3, "min_time": 0.01}

@@ -70,10 +70,16 @@ Vector6 weighted(const Vector6& weights, const Vector6& wrench) {
   return weights.cwiseProduct(wrench);
 }
 
+// The norm, also of numbers whose squares would be too large or too small: that takes longer.
+double normOf(const Vector6& wrench) {
+  const double norm = wrench.norm();
+  return norm > 1e-140 && norm < 1e140 ? norm : wrench.stableNorm();
+}
+
 // What D amounts to for a wrench: forces in newtons are a weighted wrench over this.
 double overallWeight(const Vector6& weights, const Vector6& wrench) {
-  const double size = wrench.stableNorm();
-  return size > 0. ? weighted(weights, wrench).stableNorm() / size : weights.maxCoeff();
+  const double size = normOf(wrench);
+  return size > 0. ? normOf(weighted(weights, wrench)) / size : weights.maxCoeff();
 }
 
 bool haveSameSettings(const Contact& a, const Contact& b) {
@@ -298,9 +304,11 @@ void WrenchDistribution::Workspace::takeProblem() {
   largest_weight = 0.;
   for (std::size_t k = 0; k < count; ++k) {
     Contact& contact = result.contacts[k];
-    has_answer = has_answer && haveSameSettings(contact, added[k]);
-    contact.A = added[k].A;
-    contact.weights = added[k].weights;
+    if (!haveSameSettings(contact, added[k])) {
+      has_answer = false;
+      contact.A = added[k].A;
+      contact.weights = added[k].weights;
+    }
     contact.NE = added[k].NE;
     n += contact.A.cols();
     m += contact.A.rows();
@@ -692,7 +700,7 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   const Vector6& weights = work.settings;
   result.wrench_weights = weights;
   work.overall_weight = overallWeight(weights, wrench);
-  result.scale = std::max(minimalScale, weighted(weights, wrench).stableNorm());
+  result.scale = std::max(minimalScale, normOf(weighted(weights, wrench)));
   work.unit = result.scale / work.overall_weight;
   work.wrench_weights = weights / work.overall_weight;
 
@@ -704,7 +712,7 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
              !std::isfinite(result.scale)) {  // beyond the largest numbers
     result.status = DistributionStatus::NumericalFailure;
   } else if (work.n == 0) {
-    const bool zero = weighted(weights, wrench).stableNorm() <= kReach * result.scale;
+    const bool zero = normOf(weighted(weights, wrench)) <= kReach * result.scale;
     result.status = zero ? DistributionStatus::Solved : DistributionStatus::NoContact;
   } else if (work.unit == 0.) {
     work.has_answer = false;  // all forces are zero
