@@ -173,8 +173,8 @@ bool DistributionResult::isOptimal(double tolerance) const {
 
 struct WrenchDistribution::Workspace {
   // The contacts side by side, as a problem of least norm. Its variable begins with the forces λ,
-  // each times its scale; the columns of E are the rows of NE over the units, at unit length,
-  // those of G the rows of A over the units.
+  // each times its scale; the columns of E are the rows of NE over the scales, at unit length,
+  // those of G the rows of A over the scales.
   struct Program {
     Eigen::VectorXd scales;  // n
     Eigen::MatrixXd E, G;
