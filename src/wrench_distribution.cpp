@@ -379,7 +379,7 @@ void WrenchDistribution::Workspace::assembleCheapest(Program& program, double sl
     program.scales.segment(col, contact.weights.size()) = contact.weights / largest_weight;
     col += contact.weights.size();
   }
-  assemble(program, Vector6::Ones(), slack);
+  assemble(program, slack > 0. ? wrench_weights : Vector6::Ones(), slack);
 }
 
 // The scales are what a unit of λ does to the weighted wrench. See relax().
@@ -413,7 +413,7 @@ bool WrenchDistribution::Workspace::minimizeCost(const Vector6& wrench, double d
 // each other, by the method of multipliers: what the forces do not give is added to what is asked
 // for
 //
-//     minimise ½ ‖x‖² + ½ ‖s‖²   subject to   NE λ + √ε s = asked,   A λ ≤ 0
+//     minimise ½ ‖x‖² + ½ ‖s‖²   subject to   D NE λ + √ε s = asked,   A λ ≤ 0
 //
 // again and again, until nothing is missing.
 bool WrenchDistribution::Workspace::minimizeCostOnFace(const Vector6& wrench, double tolerance) {
@@ -422,9 +422,10 @@ bool WrenchDistribution::Workspace::minimizeCostOnFace(const Vector6& wrench, do
   slackened.h.setZero(m);
   // The residual is to be accurate, too.
   const double enough = std::min(kMissing, std::max(kMissing * 1e3 * distance.norm(), kRounding));
-  Vector6 asked = wrench, missing = Vector6::Constant(std::numeric_limits<double>::infinity());
+  Vector6 asked = weighted(wrench_weights, wrench),
+          missing = Vector6::Constant(std::numeric_limits<double>::infinity());
   for (int step = 0; step < kMultiplierSteps; ++step) {
-    slackened.d = asked.cwiseQuotient(slackened.norms);
+    slackened.d = asked.cwiseQuotient(slackened.norms);  // weighted, as the slacks are
     const MinimumNorm::Status status =
         slackened.solver.solve(slackened.E, slackened.d, slackened.G, slackened.h, tolerance);
     iterations += slackened.solver.iterations();
@@ -432,7 +433,7 @@ bool WrenchDistribution::Workspace::minimizeCostOnFace(const Vector6& wrench, do
     lambda.noalias() = face * slackened.solver.x().tail(n);
     lambda = lambda.cwiseQuotient(slackened.scales);
     const Vector6 former = missing;
-    missing = wrench - give(lambda);
+    missing = weighted(wrench_weights, wrench - give(lambda));
     const double ratio = step > 0 ? missing.dot(former) / former.squaredNorm() : 0.;
     if (missing.norm() <= kRounding || (missing.norm() <= enough && step > 0 && !(ratio < 0.5)))
       break;
@@ -628,7 +629,8 @@ void WrenchDistribution::Workspace::takeAnswer() {
   const Program& program = on_face ? slackened : direct;
   const MinimumNorm& solver = program.solver;
   result.iterations = iterations;
-  const Vector6 y = solver.y().cwiseQuotient(program.norms);
+  Vector6 y = solver.y().cwiseQuotient(program.norms);
+  if (on_face) y = weighted(wrench_weights, y);
   result.wrench_multipliers = -cost_scale * y;
   multipliers = solver.z();
   gradient.resize(n);
