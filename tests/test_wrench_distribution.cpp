@@ -877,7 +877,7 @@ BOOST_AUTO_TEST_CASE(corners_of_the_cones_of_nearly_parallel_soles_are_reached) 
                                          SE3(randomTilt(random, tilt), Vector3d(0.1, side, 0.)));
       VectorXd force = random.coin() ? cornerForce(random, *contacts.back())
                                      : randomForce(random, *contacts.back(), 1.);
-      // Exactly in the corner, 4 in 1000 are given up; docs/reliability.md has the figures.
+      // Exactly in the corner, 4 in 1000 were given up.
       const double normal_force = force[2];
       force *= 1. - 1e-6;
       force[2] = normal_force;
