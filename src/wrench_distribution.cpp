@@ -577,7 +577,6 @@ DistributionStatus WrenchDistribution::Workspace::distribute(const Vector6& wren
   relaxation_multipliers.setZero(m);
   held.setConstant(n, -1);
   on_face = false;
-  products.resize(n);
   if (minimizeCost(wrench, kNearlyDependent, kExactInequality)) return DistributionStatus::Solved;
 
   if (!relax(weighted(wrench_weights, wrench))) return DistributionStatus::NumericalFailure;
@@ -633,7 +632,6 @@ void WrenchDistribution::Workspace::takeAnswer() {
   if (on_face) y = weighted(wrench_weights, y);
   result.wrench_multipliers = -cost_scale * y;
   multipliers = solver.z();
-  gradient.resize(n);
   active.setConstant(m, false);
   for (const Eigen::Index inequality : solver.active()) active[inequality] = true;
 

@@ -24,7 +24,7 @@ struct Tally {
     solved += result.status == DistributionStatus::Solved;
     relaxed += result.status == DistributionStatus::Relaxed;
     failures += result.status == DistributionStatus::NumericalFailure;
-    wrong += !verdict.error.empty();
+    wrong += !verdict.error.empty() || !result.isOptimal(1e-6);
     doubtful += verdict.doubtful;
     not_optimal += !result.isOptimal(1e-6);
     iterations = std::max(iterations, result.iterations);

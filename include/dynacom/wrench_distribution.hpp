@@ -52,7 +52,8 @@ struct DYNACOM_EXPORT DistributionResult {
     /// active; ≥ 0, but for those that the relaxation multiplies, which are equations there.
     Eigen::VectorXd multipliers;
     /// Multipliers μ' ≥ 0 of the inequalities in the relaxation, m: where one is positive, all
-    /// forces that come as close to the wrench lie on that inequality's bound. Zero unless Relaxed.
+    /// forces that come as close to the wrench lie on that inequality's bound. Zero where no
+    /// relaxation was needed.
     Eigen::VectorXd relaxation_multipliers;
   };
 
