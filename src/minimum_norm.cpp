@@ -9,23 +9,28 @@ namespace dynacom::internal {
 
 namespace {
 
-// An equality whose normal has no more than this outside the span of others follows from them.
-constexpr double kDependentEquality = 1e-10;
+template <class Scalar>
+constexpr Scalar kInfinity = std::numeric_limits<Scalar>::infinity();
+// An equality whose normal has no more than this outside the span of others follows from them: its
+// own rounding, which is that of double, is no more.
+template <class Scalar>
+constexpr Scalar kDependentEquality =
+    std::numeric_limits<Scalar>::digits > std::numeric_limits<double>::digits ? 1e-13 : 1e-10;
 // An inequality that depends on active ones contradicts them if it is violated by more than this
 // many tolerances, times what the tolerances of the active ones add up to in it.
 constexpr double kContradiction = 1e3;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Far above what has been seen, 120 for 88 inequalities.
 int iterationLimit(Eigen::Index inequalities) { return 50 + 10 * static_cast<int>(inequalities); }
 
 }  // namespace
 
-void MinimumNorm::reserve(Eigen::Index n, Eigen::Index p, Eigen::Index m) {
-  if (qr_.rows() != n || qr_.cols() != p) qr_ = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(n, p);
+template <class Scalar>
+void MinimumNorm<Scalar>::reserve(Eigen::Index n, Eigen::Index p, Eigen::Index m) {
+  if (qr_.rows() != n || qr_.cols() != p) qr_ = Eigen::ColPivHouseholderQR<Matrix>(n, p);
   J_.resize(n, n);
   R_.resize(n, n);
-  for (Eigen::VectorXd* vector : {&rhs_, &x_, &u_, &Jn_, &r_, &workspace_}) vector->resize(n);
+  for (Vector* vector : {&rhs_, &x_, &u_, &Jn_, &r_, &workspace_}) vector->resize(n);
   y_.resize(p);
   z_.resize(m);
   slack_.resize(m);
@@ -33,11 +38,10 @@ void MinimumNorm::reserve(Eigen::Index n, Eigen::Index p, Eigen::Index m) {
   implied_.reserve(m);
 }
 
-MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& E,
-                                       const Eigen::Ref<const Eigen::VectorXd>& d,
-                                       const Eigen::Ref<const Eigen::MatrixXd>& G,
-                                       const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance,
-                                       double dependent) {
+template <class Scalar>
+typename MinimumNorm<Scalar>::Status MinimumNorm<Scalar>::solve(
+    const MatrixRef& E, const VectorRef& d, const MatrixRef& G, const VectorRef& h,
+    Scalar tolerance, Scalar dependent) {
   iterations_ = 0;
   reserve(E.rows(), E.cols(), G.cols());
   implied_.clear();
@@ -47,9 +51,11 @@ MinimumNorm::Status MinimumNorm::solve(const Eigen::Ref<const Eigen::MatrixXd>& 
   return status;
 }
 
-MinimumNorm::Status MinimumNorm::activateViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
-                                                  const Eigen::Ref<const Eigen::VectorXd>& h,
-                                                  double tolerance, double dependent) {
+template <class Scalar>
+typename MinimumNorm<Scalar>::Status MinimumNorm<Scalar>::activateViolated(const MatrixRef& G,
+                                                                           const VectorRef& h,
+                                                                           Scalar tolerance,
+                                                                           Scalar dependent) {
   for (bool refined = true;;) {
     const Eigen::Index violated = findViolated(G, h, tolerance);
     if (violated < 0) {
@@ -62,7 +68,7 @@ MinimumNorm::Status MinimumNorm::activateViolated(const Eigen::Ref<const Eigen::
     refined = false;
     completeBasis();
 
-    double multiplier = 0.;
+    Scalar multiplier = 0.;
     for (bool done = false; !done;) {
       if (iterations_ == iterationLimit(G.cols())) return Status::IterationLimit;
       ++iterations_;
@@ -70,11 +76,11 @@ MinimumNorm::Status MinimumNorm::activateViolated(const Eigen::Ref<const Eigen::
       // The whole step reaches the inequality; on the way, the multiplier of an active one may
       // reach zero.
       const auto outside = Jn_.tail(Jn_.size() - q_);
-      const double violation = G.col(violated).dot(x_) - h[violated];
-      double whole = kInfinity;
+      const Scalar violation = G.col(violated).dot(x_) - h[violated];
+      Scalar whole = kInfinity<Scalar>;
       if (outside.squaredNorm() > dependent * dependent * Jn_.squaredNorm())
         whole = violation / outside.squaredNorm();
-      double partial = kInfinity;
+      Scalar partial = kInfinity<Scalar>;
       Eigen::Index leaving = -1;
       for (Eigen::Index k = equalities_; k < q_; ++k) {
         if (r_[k] > 0. && u_[k] < partial * r_[k]) {
@@ -82,17 +88,18 @@ MinimumNorm::Status MinimumNorm::activateViolated(const Eigen::Ref<const Eigen::
           leaving = k;
         }
       }
-      const double step = std::min(whole, partial);
-      if (step == kInfinity) {
+      const Scalar step = std::min(whole, partial);
+      if (step == kInfinity<Scalar>) {
         // The inequality follows from the active ones, and none of them can leave: either it
         // contradicts them, or all that it lacks is rounding.
-        if (violation > kContradiction * tolerance * (1. + r_.head(q_).lpNorm<1>()))
+        if (violation > kContradiction * tolerance * (1. + r_.head(q_).template lpNorm<1>()))
           return Status::Infeasible;
         implied_.push_back(violated);
         break;
       }
 
-      if (whole < kInfinity) x_.noalias() -= step * (J_.rightCols(J_.cols() - q_) * outside);
+      if (whole < kInfinity<Scalar>)
+        x_.noalias() -= step * (J_.rightCols(J_.cols() - q_) * outside);
       u_.head(q_) -= step * r_.head(q_);
       multiplier += step;
       if (whole <= partial) {
@@ -106,8 +113,8 @@ MinimumNorm::Status MinimumNorm::activateViolated(const Eigen::Ref<const Eigen::
 }
 
 // x becomes the point of least norm under the equalities, of which only independent ones are kept.
-void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E,
-                                      const Eigen::Ref<const Eigen::VectorXd>& d) {
+template <class Scalar>
+void MinimumNorm<Scalar>::startWithEqualities(const MatrixRef& E, const VectorRef& d) {
   active_.clear();
   complete_ = false;
 
@@ -115,7 +122,8 @@ void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E
   if (E.cols() > 0) {  // Eigen's decomposition wants one
     qr_.compute(E);
     // Eigen's threshold is relative to the largest pivot, which may be nothing but rounding.
-    qr_.setThreshold(kDependentEquality / std::max(qr_.maxPivot(), kDependentEquality));
+    qr_.setThreshold(kDependentEquality<Scalar> /
+                     std::max(qr_.maxPivot(), kDependentEquality<Scalar>));
     q_ = equalities_ = qr_.rank();
     R_.topLeftCorner(q_, q_) = qr_.matrixQR().topLeftCorner(q_, q_);
     for (Eigen::Index k = 0; k < q_; ++k) rhs_[k] = d[qr_.colsPermutation().indices()[k]];
@@ -124,14 +132,16 @@ void MinimumNorm::startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E
   // As computeSolution(), but without J.
   x_.setZero();
   x_.head(q_) = rhs_.head(q_);
-  R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>().transpose().solveInPlace(x_.head(q_));
+  R_.topLeftCorner(q_, q_).template triangularView<Eigen::Upper>().transpose().solveInPlace(
+      x_.head(q_));
   u_.head(q_) = -x_.head(q_);
-  R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>().solveInPlace(u_.head(q_));
+  R_.topLeftCorner(q_, q_).template triangularView<Eigen::Upper>().solveInPlace(u_.head(q_));
   applyQ(x_);
 }
 
 // Computes J, which problems without active inequalities never need.
-void MinimumNorm::completeBasis() {
+template <class Scalar>
+void MinimumNorm<Scalar>::completeBasis() {
   if (complete_) return;
   J_.setIdentity();
   applyQ(J_);
@@ -139,46 +149,49 @@ void MinimumNorm::completeBasis() {
 }
 
 // Multiplies by Q of the equalities' decomposition: Eigen's own way to do so allocates.
-template <class Matrix>
-void MinimumNorm::applyQ(Matrix& matrix) {
-  auto products = workspace_.head(matrix.cols()).transpose();
+template <class Scalar>
+template <class Operand>
+void MinimumNorm<Scalar>::applyQ(Operand& operand) {
+  auto products = workspace_.head(operand.cols()).transpose();
   for (Eigen::Index k = equalities_ - 1; k >= 0; --k) {
-    const Eigen::Index below = matrix.rows() - k - 1;
+    const Eigen::Index below = operand.rows() - k - 1;
     const auto reflector = qr_.matrixQR().col(k).tail(below);
-    products = matrix.row(k);
-    products.noalias() += reflector.transpose() * matrix.bottomRows(below);
+    products = operand.row(k);
+    products.noalias() += reflector.transpose() * operand.bottomRows(below);
     products *= qr_.hCoeffs()[k];
-    matrix.row(k) -= products;
-    matrix.bottomRows(below) -= reflector.lazyProduct(products);
+    operand.row(k) -= products;
+    operand.bottomRows(below) -= reflector.lazyProduct(products);
   }
 }
 
 // The inequality that x violates most, or −1.
-Eigen::Index MinimumNorm::findViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
-                                       const Eigen::Ref<const Eigen::VectorXd>& h,
-                                       double tolerance) {
+template <class Scalar>
+Eigen::Index MinimumNorm<Scalar>::findViolated(const MatrixRef& G, const VectorRef& h,
+                                               Scalar tolerance) {
   slack_ = -h;
   slack_.noalias() += G.transpose() * x_;
-  for (const Eigen::Index inequality : active_) slack_[inequality] = -kInfinity;
-  for (const Eigen::Index inequality : implied_) slack_[inequality] = -kInfinity;
+  for (const Eigen::Index inequality : active_) slack_[inequality] = -kInfinity<Scalar>;
+  for (const Eigen::Index inequality : implied_) slack_[inequality] = -kInfinity<Scalar>;
   Eigen::Index violated = -1;
   if (slack_.size() == 0 || !(slack_.maxCoeff(&violated) > tolerance)) return -1;
   return violated;
 }
 
 // The normal in the basis J, and what a step along it does to the active multipliers.
-void MinimumNorm::computeDirections(const Eigen::Ref<const Eigen::VectorXd>& normal) {
+template <class Scalar>
+void MinimumNorm<Scalar>::computeDirections(const VectorRef& normal) {
   Jn_.noalias() = J_.transpose() * normal;
   r_.head(q_) = Jn_.head(q_);
-  R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>().solveInPlace(r_.head(q_));
+  R_.topLeftCorner(q_, q_).template triangularView<Eigen::Upper>().solveInPlace(r_.head(q_));
 }
 
 // Appends the inequality of computeDirections() to the active ones.
-void MinimumNorm::activate(Eigen::Index inequality, double rhs, double multiplier) {
+template <class Scalar>
+void MinimumNorm<Scalar>::activate(Eigen::Index inequality, Scalar rhs, Scalar multiplier) {
   // Rotations turn the part outside the active span into a single component.
   for (Eigen::Index k = Jn_.size() - 1; k > q_; --k) {
     if (Jn_[k] == 0.) continue;
-    Eigen::JacobiRotation<double> rotation;
+    Eigen::JacobiRotation<Scalar> rotation;
     rotation.makeGivens(Jn_[k - 1], Jn_[k], &Jn_[k - 1]);
     J_.applyOnTheRight(k - 1, k, rotation);
   }
@@ -190,7 +203,8 @@ void MinimumNorm::activate(Eigen::Index inequality, double rhs, double multiplie
 }
 
 // Takes the constraint at a position of R, an inequality, out of the active ones.
-void MinimumNorm::leave(Eigen::Index position) {
+template <class Scalar>
+void MinimumNorm<Scalar>::leave(Eigen::Index position) {
   active_.erase(active_.begin() + (position - equalities_));
   implied_.clear();  // perhaps by this one
   --q_;
@@ -201,7 +215,7 @@ void MinimumNorm::leave(Eigen::Index position) {
   }
   // Rotations make R triangular again.
   for (Eigen::Index k = position; k < q_; ++k) {
-    Eigen::JacobiRotation<double> rotation;
+    Eigen::JacobiRotation<Scalar> rotation;
     rotation.makeGivens(R_(k, k), R_(k + 1, k), &R_(k, k));
     R_.middleCols(k + 1, q_ - k - 1).applyOnTheLeft(k, k + 1, rotation.adjoint());
     J_.applyOnTheRight(k, k + 1, rotation);
@@ -209,8 +223,9 @@ void MinimumNorm::leave(Eigen::Index position) {
 }
 
 // Solution and multipliers, anew from the active constraints: x = J₁ R⁻ᵀ rhs, u = −R⁻¹ R⁻ᵀ rhs.
-void MinimumNorm::computeSolution() {
-  const auto R = R_.topLeftCorner(q_, q_).triangularView<Eigen::Upper>();
+template <class Scalar>
+void MinimumNorm<Scalar>::computeSolution() {
+  const auto R = R_.topLeftCorner(q_, q_).template triangularView<Eigen::Upper>();
   r_.head(q_) = rhs_.head(q_);
   R.transpose().solveInPlace(r_.head(q_));
   x_.noalias() = J_.leftCols(q_) * r_.head(q_);
@@ -218,11 +233,15 @@ void MinimumNorm::computeSolution() {
   R.solveInPlace(u_.head(q_));
 }
 
-void MinimumNorm::readMultipliers() {
+template <class Scalar>
+void MinimumNorm<Scalar>::readMultipliers() {
   y_.setZero();
   for (Eigen::Index k = 0; k < equalities_; ++k) y_[qr_.colsPermutation().indices()[k]] = u_[k];
   z_.setZero();
   for (Eigen::Index k = equalities_; k < q_; ++k) z_[active_[k - equalities_]] = u_[k];
 }
+
+template class MinimumNorm<double>;
+template class MinimumNorm<long double>;
 
 }  // namespace dynacom::internal

@@ -17,9 +17,15 @@ namespace dynacom::internal {
 ///
 /// Equalities may depend on each other: those that follow from others are left out, and whether
 /// they hold is for the caller to see. Nothing is allocated once a problem of the same sizes was
-/// solved.
+/// solved. Scalar is double or long double.
+template <class Scalar>
 class MinimumNorm {
  public:
+  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
+  using MatrixRef = Eigen::Ref<const Matrix>;
+  using VectorRef = Eigen::Ref<const Vector>;
+
   enum class Status { Solved, Infeasible, IterationLimit };
 
   /// Gets the storage for problems of these sizes, as solve() does itself.
@@ -31,57 +37,50 @@ class MinimumNorm {
   /// @param G, h       inequalities, n × m and m
   /// @param tolerance  by how much Gᵀ x may exceed h
   /// @param dependent  an inequality whose normal has no more than this part outside the span of
-  /// the
-  ///                   active ones follows from them or contradicts them
-  Status solve(const Eigen::Ref<const Eigen::MatrixXd>& E,
-               const Eigen::Ref<const Eigen::VectorXd>& d,
-               const Eigen::Ref<const Eigen::MatrixXd>& G,
-               const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance,
-               double dependent = 1e-12);
+  ///                   the active ones follows from them or contradicts them
+  Status solve(const MatrixRef& E, const VectorRef& d, const MatrixRef& G, const VectorRef& h,
+               Scalar tolerance, Scalar dependent);
 
   /// The solution, n.
-  const Eigen::VectorXd& x() const { return x_; }
+  const Vector& x() const { return x_; }
   /// Multipliers of the equalities, p, and of the inequalities, m: x + E y + G z = 0.
-  const Eigen::VectorXd& y() const { return y_; }
-  const Eigen::VectorXd& z() const { return z_; }
+  const Vector& y() const { return y_; }
+  const Vector& z() const { return z_; }
   /// The active inequalities.
   const std::vector<Eigen::Index>& active() const { return active_; }
   /// How often an inequality was made active, or left.
   int iterations() const { return iterations_; }
 
  private:
-  void startWithEqualities(const Eigen::Ref<const Eigen::MatrixXd>& E,
-                           const Eigen::Ref<const Eigen::VectorXd>& d);
+  void startWithEqualities(const MatrixRef& E, const VectorRef& d);
   void completeBasis();
-  Status activateViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
-                          const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance,
-                          double dependent);
-  template <class Matrix>
-  void applyQ(Matrix& matrix);
-  Eigen::Index findViolated(const Eigen::Ref<const Eigen::MatrixXd>& G,
-                            const Eigen::Ref<const Eigen::VectorXd>& h, double tolerance);
-  void computeDirections(const Eigen::Ref<const Eigen::VectorXd>& normal);
-  void activate(Eigen::Index inequality, double rhs, double multiplier);
+  Status activateViolated(const MatrixRef& G, const VectorRef& h, Scalar tolerance,
+                          Scalar dependent);
+  template <class Operand>
+  void applyQ(Operand& operand);
+  Eigen::Index findViolated(const MatrixRef& G, const VectorRef& h, Scalar tolerance);
+  void computeDirections(const VectorRef& normal);
+  void activate(Eigen::Index inequality, Scalar rhs, Scalar multiplier);
   void leave(Eigen::Index position);
   void computeSolution();
   void readMultipliers();
 
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr_;  // of the equalities
+  Eigen::ColPivHouseholderQR<Matrix> qr_;  // of the equalities
   // J is orthogonal. Its first q columns span the normals N of the active constraints, equalities
   // first: N = J₁ R.
-  Eigen::MatrixXd J_, R_;
+  Matrix J_, R_;
   bool complete_ = false;  // whether J has been computed
   Eigen::Index q_ = 0, equalities_ = 0;
   std::vector<Eigen::Index> active_;   // inequalities, in the order of R
   std::vector<Eigen::Index> implied_;  // inequalities that follow from active ones, up to rounding
   int iterations_ = 0;
-  Eigen::VectorXd rhs_;  // of the active constraints, in the order of R
-  Eigen::VectorXd x_, y_, z_;
-  Eigen::VectorXd u_;      // multipliers: x + N u = 0
-  Eigen::VectorXd Jn_;     // Jᵀ times the normal at hand
-  Eigen::VectorXd r_;      // minus the change of u for a unit of the new multiplier
-  Eigen::VectorXd slack_;  // Gᵀ x − h
-  Eigen::VectorXd workspace_;
+  Vector rhs_;  // of the active constraints, in the order of R
+  Vector x_, y_, z_;
+  Vector u_;      // multipliers: x + N u = 0
+  Vector Jn_;     // Jᵀ times the normal at hand
+  Vector r_;      // minus the change of u for a unit of the new multiplier
+  Vector slack_;  // Gᵀ x − h
+  Vector workspace_;
 };
 
 }  // namespace dynacom::internal

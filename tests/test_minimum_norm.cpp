@@ -9,14 +9,14 @@
 
 #include "minimum_norm.hpp"
 
-using dynacom::internal::MinimumNorm;
+using MinimumNorm = dynacom::internal::MinimumNorm<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kTolerance = 1e-12;
+constexpr double kTolerance = 1e-12, kDependent = 1e-12;
 
 struct Problem {
   MatrixXd E;
@@ -25,7 +25,7 @@ struct Problem {
   VectorXd h;
 
   MinimumNorm::Status solve(MinimumNorm& solver) const {
-    return solver.solve(E, d, G, h, kTolerance);
+    return solver.solve(E, d, G, h, kTolerance, kDependent);
   }
 };
 
@@ -156,8 +156,8 @@ BOOST_AUTO_TEST_CASE(equalities_alone_give_the_pseudoinverse) {
   const MatrixXd E = (MatrixXd(3, 2) << 1., 0.6, 0., 0.8, 0., 0.).finished();
   const VectorXd d = Eigen::Vector2d(2., 2.);
   MinimumNorm solver;
-  BOOST_TEST(
-      (solver.solve(E, d, MatrixXd(3, 0), VectorXd(0), kTolerance) == MinimumNorm::Status::Solved));
+  BOOST_TEST((solver.solve(E, d, MatrixXd(3, 0), VectorXd(0), kTolerance, kDependent) ==
+              MinimumNorm::Status::Solved));
   // x = (2, 1, 0): the first component by the first equality, the second by 0.6·2 + 0.8·1 = 2.
   BOOST_TEST((solver.x() - Eigen::Vector3d(2., 1., 0.)).norm() < 1e-15 * 10.);
   // x + E y = 0: by the second component y₂ = −1 / 0.8, and by the first y₁ = −2 + 0.6 / 0.8.
@@ -172,8 +172,8 @@ BOOST_AUTO_TEST_CASE(inequalities_are_active_where_they_bind) {
   const MatrixXd E = (MatrixXd(2, 1) << 1., 0.).finished();
   const MatrixXd G = (MatrixXd(2, 2) << 0., 1., 1., 1.).finished();
   MinimumNorm solver;
-  BOOST_TEST((solver.solve(E, VectorXd::Ones(1), G, Eigen::Vector2d(5., 0.), kTolerance) ==
-              MinimumNorm::Status::Solved));
+  BOOST_TEST((solver.solve(E, VectorXd::Ones(1), G, Eigen::Vector2d(5., 0.), kTolerance,
+                           kDependent) == MinimumNorm::Status::Solved));
   BOOST_TEST((solver.x() - Eigen::Vector2d(1., -1.)).norm() < 1e-14);
   // By the second component z₂ = 1, by the first y = −1 − 1.
   BOOST_TEST((solver.z() - Eigen::Vector2d(0., 1.)).norm() < 1e-14);
@@ -183,8 +183,8 @@ BOOST_AUTO_TEST_CASE(inequalities_are_active_where_they_bind) {
   BOOST_TEST(solver.iterations() == 1);
 
   // With room enough, none is, and what was before is forgotten.
-  BOOST_TEST((solver.solve(E, VectorXd::Ones(1), G, Eigen::Vector2d(5., 1.), kTolerance) ==
-              MinimumNorm::Status::Solved));
+  BOOST_TEST((solver.solve(E, VectorXd::Ones(1), G, Eigen::Vector2d(5., 1.), kTolerance,
+                           kDependent) == MinimumNorm::Status::Solved));
   BOOST_TEST((solver.x() - Eigen::Vector2d(1., 0.)).norm() < 1e-14);
   BOOST_TEST(solver.active().empty());
   BOOST_TEST(solver.z().isZero(0.));
@@ -196,8 +196,8 @@ BOOST_AUTO_TEST_CASE(an_inequality_made_active_too_early_is_left) {
   // second comes (5, 5), where the first does not bind.
   const MatrixXd G = (MatrixXd(2, 2) << -1., -0.1, 0., -0.1).finished();
   MinimumNorm solver;
-  BOOST_TEST((solver.solve(MatrixXd(2, 0), VectorXd(0), G, Eigen::Vector2d(-2., -1.), kTolerance) ==
-              MinimumNorm::Status::Solved));
+  BOOST_TEST((solver.solve(MatrixXd(2, 0), VectorXd(0), G, Eigen::Vector2d(-2., -1.), kTolerance,
+                           kDependent) == MinimumNorm::Status::Solved));
   BOOST_TEST((solver.x() - Eigen::Vector2d(5., 5.)).norm() < 1e-13);
   BOOST_TEST((solver.z() - Eigen::Vector2d(0., 50.)).norm() < 1e-12);
   BOOST_REQUIRE(solver.active().size() == 1u);
@@ -210,10 +210,10 @@ BOOST_AUTO_TEST_CASE(half_spaces_without_a_common_point_are_infeasible) {
   const MatrixXd G = (MatrixXd(1, 2) << 1., -1.).finished();
   const VectorXd h = Eigen::Vector2d(-1., -1.);  // x ≤ −1 and x ≥ 1
   MinimumNorm solver;
-  BOOST_TEST((solver.solve(MatrixXd(1, 0), VectorXd(0), G, h, kTolerance) ==
+  BOOST_TEST((solver.solve(MatrixXd(1, 0), VectorXd(0), G, h, kTolerance, kDependent) ==
               MinimumNorm::Status::Infeasible));
   // And it can be used again.
-  BOOST_TEST((solver.solve(MatrixXd(1, 0), VectorXd(0), G.leftCols(1), h.head(1), kTolerance) ==
-              MinimumNorm::Status::Solved));
+  BOOST_TEST((solver.solve(MatrixXd(1, 0), VectorXd(0), G.leftCols(1), h.head(1), kTolerance,
+                           kDependent) == MinimumNorm::Status::Solved));
   BOOST_TEST(solver.x()[0] == -1.);
 }
