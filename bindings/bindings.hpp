@@ -2,12 +2,15 @@
 #pragma once
 
 #include <eigenpy/eigenpy.hpp>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "check.hpp"
 
-// What the bindings have in common. Vectors and matrices come in as any numpy array of numbers and
-// go out as copies; errors of C++ become those of Python, see module.cpp.
+// What the bindings have in common. Vectors and matrices come in as any numpy array of numbers,
+// those of a fixed size as lists and tuples too, and go out as copies; errors of C++ become those
+// of Python, see module.cpp.
 
 namespace dynacom::python {
 
@@ -22,12 +25,17 @@ void exposeWrenchDistribution();
 void exposeDynaCoM();
 void exposeMotion();
 
-/// A vector of a fixed size from an array. Boost.Python would refuse one of another size without
-/// naming it.
+/// The numbers of an array, a list or a tuple; everything else is a TypeError. Not a converter of
+/// Boost.Python's: that would be one for Pinocchio's functions too, and choose among their
+/// overloads.
+Eigen::VectorXd toNumbers(const char* name, const bp::object& values, int size);
+
+/// A vector of a fixed size. Boost.Python would refuse one of another size without naming it.
 template <int size>
-Eigen::Matrix<double, size, 1> toVector(const char* name, const Eigen::VectorXd& values) {
-  internal::requireSize(name, values.size(), Eigen::Index(size), "components");
-  return values;
+Eigen::Matrix<double, size, 1> toVector(const char* name, const bp::object& values) {
+  const Eigen::VectorXd numbers = toNumbers(name, values, size);
+  internal::requireSize(name, numbers.size(), Eigen::Index(size), "components");
+  return numbers;
 }
 
 /// A property that hands out a copy of a member.
@@ -40,10 +48,10 @@ bp::object getter(Value Class::*member) {
 template <class Class, int size>
 bp::object setter(Eigen::Matrix<double, size, 1> Class::*member, const char* name) {
   return bp::make_function(
-      [member, name](Class& self, const Eigen::VectorXd& values) {
+      [member, name](Class& self, const bp::object& values) {
         self.*member = toVector<size>(name, values);
       },
-      bp::default_call_policies(), boost::mpl::vector3<void, Class&, const Eigen::VectorXd&>());
+      bp::default_call_policies(), boost::mpl::vector3<void, Class&, const bp::object&>());
 }
 
 /// A method that takes a vector and nothing else.
@@ -51,11 +59,11 @@ template <class Class, class Result, int size>
 bp::object method(Result (Class::*member)(const Eigen::Matrix<double, size, 1>&),
                   const char* name) {
   return bp::make_function(
-      [member, name](Class& self, const Eigen::VectorXd& values) {
+      [member, name](Class& self, const bp::object& values) {
         return (self.*member)(toVector<size>(name, values));
       },
       bp::default_call_policies(), (bp::arg("self"), bp::arg(name)),
-      boost::mpl::vector3<Result, Class&, const Eigen::VectorXd&>());
+      boost::mpl::vector3<Result, Class&, const bp::object&>());
 }
 
 /// A matrix as an array with two dimensions: a matrix of one row or column would have only one.
@@ -86,6 +94,24 @@ struct CopyVisitor : bp::def_visitor<CopyVisitor<Class>> {
   }
   static Class copy(const Class& self) { return self; }
   static Class deepcopy(const Class& self, const bp::dict&) { return self; }
+};
+
+/// "[1 2 3]", as in the printing of settings.
+std::string toText(const Eigen::VectorXd& values);
+/// "['left', 'right']"
+std::string toText(const std::vector<std::string>& names);
+
+/// Gives a class its printing, by a function that writes "Class(field=value, ...)".
+template <class Class>
+struct PrintVisitor : bp::def_visitor<PrintVisitor<Class>> {
+  explicit PrintVisitor(std::string (*write)(const Class&)) : write_(write) {}
+  template <class PyClass>
+  void visit(PyClass& cls) const {
+    cls.def("__str__", write_, bp::arg("self")).def("__repr__", write_, bp::arg("self"));
+  }
+
+ private:
+  std::string (*write_)(const Class&);
 };
 
 /// Gives a settings struct its printing, comparing and copying.

@@ -6,19 +6,31 @@ namespace dynacom::python {
 
 namespace {
 
-CentroidalWrench groundWrench(const CentroidalState& state, const Eigen::VectorXd& gravity,
-                              const Eigen::VectorXd& ext_wrench) {
+std::string writeState(const CentroidalState& state) {
+  return internal::concat("CentroidalState(mass=", state.mass, ", com=", toText(state.com),
+                          ", vcom=", toText(state.vcom), ", acom=", toText(state.acom),
+                          ", am=", toText(state.am), ", amVariation=", toText(state.amVariation),
+                          ")");
+}
+
+std::string writeWrench(const CentroidalWrench& wrench) {
+  return internal::concat("CentroidalWrench(force=", toText(wrench.force),
+                          ", torque=", toText(wrench.torque), ")");
+}
+
+CentroidalWrench groundWrench(const CentroidalState& state, const bp::object& gravity,
+                              const bp::object& ext_wrench) {
   return computeGroundWrench(state, toVector<3>("gravity", gravity),
                              toVector<6>("extWrench", ext_wrench));
 }
 
 CentroidalState applyWrench(const CentroidalState& state, const CentroidalWrench& wrench,
-                            const Eigen::VectorXd& gravity, const Eigen::VectorXd& ext_wrench) {
+                            const bp::object& gravity, const bp::object& ext_wrench) {
   return applyGroundWrench(state, wrench, toVector<3>("gravity", gravity),
                            toVector<6>("extWrench", ext_wrench));
 }
 
-Eigen::Vector2d flatGroundCoP(const CentroidalWrench& wrench, const Eigen::VectorXd& com,
+Eigen::Vector2d flatGroundCoP(const CentroidalWrench& wrench, const bp::object& com,
                               double ground_height, double minimal_vertical_force) {
   return computeFlatGroundCoP(wrench, toVector<3>("com", com), ground_height,
                               minimal_vertical_force);
@@ -40,14 +52,18 @@ void exposeCentroidal() {
       .add_property("am", getter(&CentroidalState::am), setter(&CentroidalState::am, "am"),
                     "L, angular momentum about c, (3,) [kg·m²/s]")
       .add_property("amVariation", getter(&CentroidalState::amVariation),
-                    setter(&CentroidalState::amVariation, "amVariation"), "dL/dt, (3,) [N·m]");
+                    setter(&CentroidalState::amVariation, "amVariation"), "dL/dt, (3,) [N·m]")
+      .def(PrintVisitor<CentroidalState>(&writeState))
+      .def(CopyVisitor<CentroidalState>());
 
   bp::class_<CentroidalWrench>(
       "CentroidalWrench", "A wrench about the centre of mass, in the world's axes.", bp::init<>())
       .add_property("force", getter(&CentroidalWrench::force),
                     setter(&CentroidalWrench::force, "force"), "f, (3,) [N]")
       .add_property("torque", getter(&CentroidalWrench::torque),
-                    setter(&CentroidalWrench::torque, "torque"), "tau about c, (3,) [N·m]");
+                    setter(&CentroidalWrench::torque, "torque"), "tau about c, (3,) [N·m]")
+      .def(PrintVisitor<CentroidalWrench>(&writeWrench))
+      .def(CopyVisitor<CentroidalWrench>());
 
   bp::def("computeCentroidalState", &computeCentroidalState,
           (bp::arg("model"), bp::arg("data"), bp::arg("q"), bp::arg("v"), bp::arg("a")),
@@ -74,9 +90,11 @@ void exposeCentroidal() {
            bp::arg("minimalVerticalForce") = kMinimalVerticalForce),
           "Centre of pressure on flat horizontal ground, equation (5), (2,), world [m]; NaN where\n"
           "the vertical force is below minimalVerticalForce [N].");
-  bp::def("computeVRP", &computeVRP, (bp::arg("state"), bp::arg("omega")),
-          "Virtual repellent point c - d²c/dt² / omega², equation (7), (2,) [m].\n\n"
-          "omega: > 0 [rad/s], else ValueError.");
+  bp::def(
+      "computeVRP", &computeVRP, (bp::arg("state"), bp::arg("omega")),
+      "Virtual repellent point c - d²c/dt² / omega², equation (7), (2,) [m]; NaN where that is\n"
+      "beyond the largest numbers.\n\n"
+      "omega: > 0 [rad/s], else ValueError.");
 }
 
 }  // namespace dynacom::python

@@ -4,6 +4,16 @@
 
 namespace dynacom::python {
 
+namespace {
+
+std::string write(const Contact6D& contact) {
+  // Before initialize() there is nothing to tell.
+  return contact.cols() == 0 ? "Contact6D()"
+                             : internal::concat("Contact6D(", contact.getSettings(), ")");
+}
+
+}  // namespace
+
 void exposeContact6D() {
   using Settings = Contact6DSettings;
   bp::class_<Settings>("Contact6DSettings",
@@ -42,7 +52,8 @@ void exposeContact6D() {
       .def("setSurfaceHalfWidth", &Contact6D::setSurfaceHalfWidth,
            (bp::arg("self"), bp::arg("half_width")), "half_width: >= 0 [m].")
       .def("setSurfaceHalfLength", &Contact6D::setSurfaceHalfLength,
-           (bp::arg("self"), bp::arg("half_length")), "half_length: >= 0 [m].");
+           (bp::arg("self"), bp::arg("half_length")), "half_length: >= 0 [m].")
+      .def(PrintVisitor<Contact6D>(&write));
 }
 
 }  // namespace dynacom::python

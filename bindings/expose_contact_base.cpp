@@ -10,8 +10,12 @@ std::shared_ptr<ContactBase> deepcopy(const ContactBase& self, const bp::dict&) 
   return self.clone();
 }
 
-void updateNewtonEuler(ContactBase& self, const Eigen::VectorXd& com, const pinocchio::SE3& oMs) {
+void updateNewtonEuler(ContactBase& self, const bp::object& com, const pinocchio::SE3& oMs) {
   self.updateNewtonEuler(toVector<3>("com", com), oMs);
+}
+
+void applyForce(ContactBase& self, const bp::object& force) {
+  self.applyForce(toNumbers("force", force, int(self.cols())));
 }
 
 }  // namespace
@@ -63,7 +67,7 @@ void exposeContactBase() {
            "com: (3,), world [m]; oMs: placement of the contact's frame (pinocchio.SE3).")
       .def("appliedForce", &ContactBase::appliedForce, bp::arg("self"), Copied(),
            "The force lambda in force, (cols,), in the surface's frame.")
-      .def("applyForce", &ContactBase::applyForce, (bp::arg("self"), bp::arg("force")),
+      .def("applyForce", &applyForce, (bp::arg("self"), bp::arg("force")),
            "Records the force lambda that acts here; ValueError unless it is (cols,).")
       .def("deactivate", &ContactBase::deactivate, bp::arg("self"),
            "The applied force becomes zero.")
@@ -75,9 +79,10 @@ void exposeContactBase() {
            "Centre of pressure in the surface's plane, (2,) [m]; NaN unless the normal force is\n"
            "positive.")
       .def("getFrictionUsage", &ContactBase::getFrictionUsage, bp::arg("self"),
-           "The larger of |f_x| and |f_y| over mu f_z, 1 on the pyramid: 0 where there is no "
-           "force,\n"
-           "infinite where there is one without a positive normal force, NaN without friction.")
+           "The larger of |f_x| and |f_y| over mu f_z, 1 on the pyramid: NaN without friction; "
+           "else\n"
+           "0 where there is no force, and infinite where there is one without a positive normal\n"
+           "force.")
       .def("getCoPMargin", &ContactBase::getCoPMargin, bp::arg("self"),
            "Distance of getCoP() to the nearest edge, negative beyond it [m]; NaN unless the "
            "normal\n"

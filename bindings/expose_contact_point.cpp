@@ -4,6 +4,16 @@
 
 namespace dynacom::python {
 
+namespace {
+
+std::string write(const ContactPoint& contact) {
+  // Before initialize() there is nothing to tell.
+  return contact.cols() == 0 ? "ContactPoint()"
+                             : internal::concat("ContactPoint(", contact.getSettings(), ")");
+}
+
+}  // namespace
+
 void exposeContactPoint() {
   using Settings = ContactPointSettings;
   bp::class_<Settings>("ContactPointSettings",
@@ -32,7 +42,8 @@ void exposeContactPoint() {
       .def("setMu", &ContactPoint::setMu, (bp::arg("self"), bp::arg("mu")),
            "Friction coefficient, >= 0.")
       .def("setForceWeights", method(&ContactPoint::setForceWeights, "force_weights"),
-           "force_weights: (3,), > 0 [1/N].");
+           "force_weights: (3,), > 0 [1/N].")
+      .def(PrintVisitor<ContactPoint>(&write));
 }
 
 }  // namespace dynacom::python

@@ -19,20 +19,28 @@ std::shared_ptr<ContactBase> getContact(const DynaCoM& self, const std::string& 
   return self.getContact(name);
 }
 
+std::string write(const DynaCoM& robot) {
+  if (!robot.isInitialized()) return "DynaCoM()";
+  const pinocchio::Model& model = robot.getModel();
+  return internal::concat("DynaCoM(mass=", robot.getMass(), ", nq=", model.nq, ", nv=", model.nv,
+                          ", active_contacts=", toText(robot.getActiveContacts()),
+                          ", known_contacts=", toText(robot.getKnownContacts()), ")");
+}
+
 using VectorRef = DynaCoM::VectorRef;
 
 void computeDynamics(DynaCoM& self, const VectorRef& q, const VectorRef& v, const VectorRef& a,
-                     const Eigen::VectorXd& ext_wrench, bool flat_horizontal_ground) {
+                     const bp::object& ext_wrench, bool flat_horizontal_ground) {
   self.computeDynamics(q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
 void computeNL(DynaCoM& self, double omega, const VectorRef& q, const VectorRef& v,
-               const VectorRef& a, const Eigen::VectorXd& ext_wrench, bool flat_horizontal_ground) {
+               const VectorRef& a, const bp::object& ext_wrench, bool flat_horizontal_ground) {
   self.computeNL(omega, q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
-DistributionStatus distributeForce(DynaCoM& self, const Eigen::VectorXd& force,
-                                   const Eigen::VectorXd& torque, const Eigen::VectorXd& com) {
+DistributionStatus distributeForce(DynaCoM& self, const bp::object& force, const bp::object& torque,
+                                   const bp::object& com) {
   return self.distributeForce(toVector<3>("groundCoMForce", force),
                               toVector<3>("groundCoMTorque", torque), toVector<3>("com", com));
 }
@@ -101,7 +109,9 @@ void exposeDynaCoM() {
             bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
            "Computes the centroidal state, the ground wrench (1, 2), the placements of the\n"
            "contacts and the centre of pressure: by (5) on flat horizontal ground, else by (6),\n"
-           "after distributing the wrench. All results are NaN if a number is not finite.\n\n"
+           "after distributing the wrench. All results are NaN if a number is not finite, or "
+           "becomes\n"
+           "so.\n\n"
            "q: (nq,); v: (nv,); a: (nv,); extWrench: (6,), force [N] and moment [N·m] about the\n"
            "centre of mass. Raises ValueError if one has another size.")
       .def("getGroundCoMForce", &DynaCoM::getGroundCoMForce, bp::arg("self"), Copied(),
@@ -175,28 +185,32 @@ void exposeDynaCoM() {
           "contact is given its force. Returns the DistributionStatus; getDistribution() has all.\n"
           "\n"
           "groundCoMForce: (3,) [N]; groundCoMTorque: (3,), about the centre of mass [N·m];\n"
-          "com: (3,) [m].")
-      .def("getDistribution", &DynaCoM::getDistribution, bp::arg("self"), Copied(),
-           "The last distribution, a DistributionResult, a copy; its contacts are those that were\n"
-           "active then, in the order of their activation.")
+          "com: (3,), that of getCoM(), or getFeasibleAMVariation() means nothing [m].")
+      .def(
+          "getDistribution", &DynaCoM::getDistribution, bp::arg("self"), Copied(),
+          "The last distribution, be it distributeForce()'s or that of computeDynamics on uneven\n"
+          "ground: a DistributionResult, a copy; its contacts are those that were active then, in\n"
+          "the order of their activation.")
       .def("getDistributionStatus", &DynaCoM::getDistributionStatus, bp::arg("self"),
            "How the last distribution ended; NoContact before the first.")
       .def("computeWrenchMargin", &DynaCoM::computeWrenchMargin, bp::arg("self"),
-           "How far the last distribution's wrench is from what the contacts cannot give: a\n"
-           "WrenchMargin. For a look, not for a control loop.")
+           "How far the last distribution's wrench is from what its contacts cannot give: a\n"
+           "WrenchMargin. Takes many times as long as a distribution.")
       .def("getContactCoP", &DynaCoM::getContactCoP, (bp::arg("self"), bp::arg("name")),
            "A contact's centre of pressure in its surface's plane, (2,) [m]; NaN where its normal\n"
            "force is below getMinimalVerticalForce(). ValueError if the name is not known.")
       .def("getContactFrictionUsage", &DynaCoM::getContactFrictionUsage,
            (bp::arg("self"), bp::arg("name")),
            "The contact's getFrictionUsage(); 0 where its normal force is below\n"
-           "getMinimalVerticalForce(). ValueError if the name is not known.")
+           "getMinimalVerticalForce(), unless it is NaN for all forces. ValueError if the name is "
+           "not known.")
       .def("getContactCoPMargin", &DynaCoM::getContactCoPMargin, (bp::arg("self"), bp::arg("name")),
            "The contact's getCoPMargin() [m]; NaN where its normal force is below\n"
            "getMinimalVerticalForce(). ValueError if the name is not known.")
       .def("getContactYawUsage", &DynaCoM::getContactYawUsage, (bp::arg("self"), bp::arg("name")),
            "The contact's getYawUsage(); 0 where its normal force is below\n"
-           "getMinimalVerticalForce(). ValueError if the name is not known.")
+           "getMinimalVerticalForce(), unless it is NaN for all forces. ValueError if the name is "
+           "not known.")
       .def("uni_A", DYNACOM_MATRIX(DynaCoM, uni_A), bp::arg("self"),
            "Unilaterality of the active contacts, block-diagonal.")
       .def("uni_b", &DynaCoM::uni_b, bp::arg("self"), "Right-hand side of unilaterality, zero.")
@@ -211,6 +225,7 @@ void exposeDynaCoM() {
            "The wrench that the last distribution was asked for, (6,).")
       .def("allForces", &DynaCoM::allForces, bp::arg("self"),
            "Forces of the active contacts, stacked, each in its surface's frame.")
+      .def(PrintVisitor<DynaCoM>(&write))
       .def(CopyVisitor<DynaCoM>());
 }
 

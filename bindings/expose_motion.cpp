@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-2-Clause
+#include <map>
+
 #include "bindings.hpp"
 #include "dynacom/motion.hpp"
 
@@ -45,6 +47,34 @@ bp::list getContacts(const MotionAnalysis& analysis) {
   bp::list contacts;
   for (const MotionAnalysis::Contact& contact : analysis.contacts) contacts.append(contact);
   return contacts;
+}
+
+std::string writeMotion(const Motion& motion) {
+  return internal::concat("Motion(frames=", motion.frames(), ", nq=", motion.q.rows(),
+                          ", nv=", motion.v.rows(), ")");
+}
+
+std::string writeSchedule(const Schedule& schedule) {
+  return internal::concat("ContactSchedule(frames=", schedule.active.cols(),
+                          ", names=", toText(schedule.names), ")");
+}
+
+std::string writeAnalysis(const MotionAnalysis& analysis) {
+  std::map<DistributionStatus, int> counts;
+  for (const DistributionStatus status : analysis.status) ++counts[status];
+  std::string frames;  // with each status
+  for (const auto& [status, count] : counts)
+    frames += internal::concat(frames.empty() ? "" : ", ", status, ": ", count);
+  std::vector<std::string> names;
+  for (const MotionAnalysis::Contact& contact : analysis.contacts) names.push_back(contact.name);
+  return internal::concat("MotionAnalysis(frames=", analysis.status.size(), ", status={", frames,
+                          "}, omega=", analysis.omega, ", contacts=", toText(names), ")");
+}
+
+std::string writeContact(const MotionAnalysis::Contact& contact) {
+  return internal::concat("MotionAnalysis.Contact(name='", contact.name,
+                          "', frames=", contact.active.size(),
+                          ", active_frames=", contact.active.count(), ")");
 }
 
 // Reads a matrix member with a row per frame.
@@ -113,7 +143,9 @@ void exposeMotion() {
       .add_property("frames", &Motion::frames, "T")
       .def("validate", &Motion::validate, (bp::arg("self"), bp::arg("model")),
            "Raises ValueError, naming the array and the frame, if sizes do not fit the model, a\n"
-           "number is not finite, or time does not increase.");
+           "number is not finite, or time does not increase.")
+      .def(PrintVisitor<Motion>(&writeMotion))
+      .def(CopyVisitor<Motion>());
 
   bp::class_<Schedule, std::shared_ptr<Schedule>>("ContactSchedule",
                                                   "Which contacts are active when.", bp::no_init)
@@ -124,7 +156,9 @@ void exposeMotion() {
       .add_property("names", &getNames, "Names of the C contacts")
       .add_property("active", &Rows<&Schedule::active>::get, "(T, C) of bool")
       .def("validate", &Schedule::validate, (bp::arg("self"), bp::arg("frames")),
-           "Raises ValueError if a name is there twice or active is not (frames, C).");
+           "Raises ValueError if a name is there twice or active is not (frames, C).")
+      .def(PrintVisitor<Schedule>(&writeSchedule))
+      .def(CopyVisitor<Schedule>());
 
   bp::def(
       "analyzeMotion", &analyze,
@@ -160,13 +194,17 @@ void exposeMotion() {
           .add_property("status", &getStatus, "T times a DistributionStatus")
           .add_property("residual", &Rows<&Analysis::residual>::get,
                         "Ground wrench minus what the contacts give, (T, 6)")
-          .add_property("contacts", &getContacts, "A MotionAnalysis.Contact for each contact");
+          .add_property("contacts", &getContacts, "A MotionAnalysis.Contact for each contact")
+          .def(PrintVisitor<Analysis>(&writeAnalysis))
+          .def(CopyVisitor<Analysis>());
   bp::class_<Contact>("Contact", "What one contact does.", bp::no_init)
       .def_readonly("name", &Contact::name, "The name under which the robot knows it.")
       .add_property("active", &getContactActive, "(T,) of bool")
       .add_property("wrench", &Rows<&Contact::wrench>::get,
                     "(force, moment) in the surface's frame about its origin, (T, 6)")
-      .add_property("vertical_force", getter(&Contact::vertical_force), "In the world, (T,) [N]");
+      .add_property("vertical_force", getter(&Contact::vertical_force), "In the world, (T,) [N]")
+      .def(PrintVisitor<Contact>(&writeContact))
+      .def(CopyVisitor<Contact>());
 }
 
 }  // namespace dynacom::python

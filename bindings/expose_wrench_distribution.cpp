@@ -14,8 +14,7 @@ void addMatrices(WrenchDistribution& self, const Eigen::MatrixXd& A, const Eigen
   self.add(A, weights, NE);
 }
 
-DistributionStatus solve(WrenchDistribution& self, const Eigen::VectorXd& wrench,
-                         double minimal_scale) {
+DistributionStatus solve(WrenchDistribution& self, const bp::object& wrench, double minimal_scale) {
   return self.solve(toVector<6>("wrench", wrench), minimal_scale);
 }
 
@@ -23,6 +22,43 @@ bp::list getContacts(const DistributionResult& self) {
   bp::list contacts;
   for (const Contact& contact : self.contacts) contacts.append(contact);
   return contacts;
+}
+
+// A status is copied, and sent to another process, by its name: Boost.Python's enums are integers
+// and would come back as such, without it.
+bp::tuple reduceStatus(const bp::object& self) {
+  const bp::object cls = self.attr("__class__"), name = self.attr("name");
+  return bp::make_tuple(bp::object(bp::import("builtins").attr("getattr")),
+                        bp::make_tuple(cls, name));
+}
+
+std::string writeResult(const DistributionResult& result) {
+  std::string forces;
+  for (const Contact& contact : result.contacts)
+    forces += (forces.empty() ? "" : ", ") + toText(contact.force);
+  return internal::concat(
+      "DistributionResult(status=", result.status, ", wrench=", toText(result.wrench),
+      ", achieved=", toText(result.achieved), ", residual=", toText(result.residual),
+      ", wrench_weights=", toText(result.wrench_weights), ", scale=", result.scale,
+      ", cost=", result.cost, ", iterations=", result.iterations, ", forces=[", forces, "])");
+}
+
+std::string writeContact(const Contact& contact) {
+  return internal::concat("DistributionResult.Contact(force=", toText(contact.force),
+                          ", active=", toText(contact.active.cast<double>()),
+                          ", multipliers=", toText(contact.multipliers),
+                          ", relaxation_multipliers=", toText(contact.relaxation_multipliers), ")");
+}
+
+std::string writeMargin(const WrenchMargin& margin) {
+  return internal::concat("WrenchMargin(margin=", margin.margin, ", axis=", margin.axis,
+                          ", sign=", margin.sign, ")");
+}
+
+std::string writeDistribution(const WrenchDistribution& distribution) {
+  return internal::concat(
+      "WrenchDistribution(wrench_weights=", toText(distribution.getWrenchWeights()),
+      ", status=", distribution.result().status, ")");
 }
 
 bp::object getA(const Contact& self) { return toArray(self.A); }
@@ -34,34 +70,40 @@ bp::object getActive(const Contact& self) {
 }  // namespace
 
 void exposeWrenchDistribution() {
-  bp::enum_<DistributionStatus>(
+  bp::enum_<DistributionStatus> status(
       "DistributionStatus",
-      "How a distribution ended. Whatever it says, the forces lie within all inequalities.\n\n"
+      "How a distribution ended. Whatever it says, the forces lie within all inequalities, but "
+      "for\n"
+      "rounding of 1e-9 of the scale.\n\n"
       "Solved: the wrench can be reached, its distance to what the contacts can give is at most\n"
       "1e-8 of the scale; the forces give it and are the cheapest that do.\n"
       "Relaxed: it is out of reach; the forces give the closest that the contacts can give, and\n"
       "are the cheapest that do.\n"
-      "NoContact: there is no contact, and the wrench is not zero.\n"
+      "NoContact: there is no contact, and the wrench is not zero. Also before the first solve().\n"
       "InvalidInput: a number that came in was not finite; the forces are those of the last "
       "answer\n"
       "if contacts and settings are still the same, else zero.\n"
       "NumericalFailure: the iterations were used up, or the answer did not pass the check; the\n"
-      "forces are as for InvalidInput.")
-      .value("Solved", DistributionStatus::Solved)
+      "forces are as for InvalidInput.");
+  status.value("Solved", DistributionStatus::Solved)
       .value("Relaxed", DistributionStatus::Relaxed)
       .value("NoContact", DistributionStatus::NoContact)
       .value("InvalidInput", DistributionStatus::InvalidInput)
       .value("NumericalFailure", DistributionStatus::NumericalFailure);
+  status.attr("__reduce__") = bp::make_function(&reduceStatus);
 
   {
     const bp::scope result =
-        bp::class_<DistributionResult>("DistributionResult",
-                                       "What a distribution was asked, and what it answered.\n\n"
-                                       "Wrenches are (6,): force [N] and moment [N·m] about the "
-                                       "centre of mass, world axes;\n"
-                                       "their size is the norm of wrench_weights * wrench. Before "
-                                       "the first solve() numbers are NaN.",
-                                       bp::no_init)
+        bp::class_<DistributionResult>(
+            "DistributionResult",
+            "What a distribution was asked, and what it answered.\n\n"
+            "Wrenches are (6,): force [N] and moment [N·m] about the "
+            "centre of mass, world axes;\n"
+            "their size is the norm of wrench_weights * wrench. Where there is no answer, "
+            "multipliers are\n"
+            "zero, and achieved and cost are those of the forces that stay. Before "
+            "the first solve() numbers are NaN.",
+            bp::no_init)
             .def_readonly("status", &DistributionResult::status, "DistributionStatus.")
             .add_property("wrench", getter(&DistributionResult::wrench),
                           "What was asked for, (6,).")
@@ -72,7 +114,7 @@ void exposeWrenchDistribution() {
             .add_property("wrench_weights", getter(&DistributionResult::wrench_weights),
                           "Weights of the norm of wrenches, (6,).")
             .def_readonly("scale", &DistributionResult::scale,
-                          "What tolerances are relative to [N].")
+                          "Of the norm of wrenches, what tolerances are relative to.")
             .def_readonly("cost", &DistributionResult::cost, "Half the sum of (w_i lambda_i)^2.")
             .def_readonly("iterations", &DistributionResult::iterations,
                           "Of the active-set method, in both stages.")
@@ -90,6 +132,7 @@ void exposeWrenchDistribution() {
                  "no reachable wrench closer. False for InvalidInput and NumericalFailure, and\n"
                  "before the first solve().\n\n"
                  "tolerance: of each of these, relative to the terms that it compares.")
+            .def(PrintVisitor<DistributionResult>(&writeResult))
             .def(CopyVisitor<DistributionResult>());
 
     bp::class_<Contact>("Contact", "One contact's share of a problem, and of its answer.",
@@ -99,8 +142,10 @@ void exposeWrenchDistribution() {
         .add_property("weights", getter(&Contact::weights), "Weights of the cost, (n,).")
         .add_property("NE", &getNE, "Takes lambda to the wrench about the centre of mass, (6, n).")
         .add_property("force", getter(&Contact::force), "lambda, in the surface's frame, (n,).")
-        .add_property("active", &getActive,
-                      "Which inequalities hold as equations in the answer, (m,) of bool.")
+        .add_property(
+            "active", &getActive,
+            "Which inequalities the answer was found with as equations, (m,) of bool. Others\n"
+            "may be equations, too, where more meet than are needed.")
         .add_property("multipliers", getter(&Contact::multipliers),
                       "mu of the inequalities in the minimum of the cost, (m,): zero where one is\n"
                       "not active; not negative, but for those that the relaxation multiplies.")
@@ -108,7 +153,9 @@ void exposeWrenchDistribution() {
             "relaxation_multipliers", getter(&Contact::relaxation_multipliers),
             "mu' of the inequalities in the relaxation, (m,), not negative: where one is\n"
             "positive, all forces that come as close to the wrench hold it as an\n"
-            "equation. Zero where no relaxation was needed.")
+            "equation. Zero where no relaxation was needed. Below 1e-10 of the distance, or\n"
+            "1e-14 of the scale, it is rounding.")
+        .def(PrintVisitor<Contact>(&writeContact))
         .def(CopyVisitor<Contact>());
   }
 
@@ -122,7 +169,9 @@ void exposeWrenchDistribution() {
       .def_readonly("axis", &WrenchMargin::axis,
                     "The component that gives way first, 0 to 5; -1 where the margin is infinite\n"
                     "or NaN, or the wrench out of reach.")
-      .def_readonly("sign", &WrenchMargin::sign, "The sign of what is added to it; 0 likewise.");
+      .def_readonly("sign", &WrenchMargin::sign, "The sign of what is added to it; 0 likewise.")
+      .def(PrintVisitor<WrenchMargin>(&writeMargin))
+      .def(CopyVisitor<WrenchMargin>());
 
   bp::class_<WrenchDistribution>(
       "WrenchDistribution",
@@ -130,11 +179,13 @@ void exposeWrenchDistribution() {
       "equations (9-13), or the closest wrench that the contacts can give. clear(), add() every\n"
       "contact, solve(), result().",
       bp::init<>(bp::arg("self")))
-      .def("setWrenchWeights",
-           method<WrenchDistribution>(&WrenchDistribution::setWrenchWeights, "weights"),
-           "Weights of the norm in which the closest wrench is the closest, (6,): three of the\n"
-           "force, three of the moment [1/m]; all 1 by default. ValueError unless all are finite\n"
-           "and > 0.")
+      .def(
+          "setWrenchWeights",
+          method<WrenchDistribution>(&WrenchDistribution::setWrenchWeights, "weights"),
+          "Weights of the norm in which the closest wrench is the closest, (6,): three of the\n"
+          "force, three of the moment [1/m]; all 1 by default. Their common factor means nothing;\n"
+          "apart by more than about 1e4, some wrenches out of reach end as NumericalFailure, and\n"
+          "computeMargin() may be wrong. ValueError unless all are finite and > 0.")
       .def("getWrenchWeights", &WrenchDistribution::getWrenchWeights, bp::arg("self"), Copied(),
            "Those weights, (6,).")
       .def(
@@ -143,7 +194,9 @@ void exposeWrenchDistribution() {
           "weights of before, a solve() without an answer keeps the forces of before.")
       .def<void (WrenchDistribution::*)(const ContactBase&)>(
           "add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact")),
-          "Adds a contact with the matrices that it has now.")
+          "Adds a contact with the matrices that it has now. ValueError if it was never "
+          "initialised,\n"
+          "NotReadyError if updateNewtonEuler() never placed it.")
       .def(
           "add", &addMatrices, (bp::arg("self"), bp::arg("A"), bp::arg("weights"), bp::arg("NE")),
           "Adds a contact by its matrices: inequalities A lambda <= 0, (m, n); weights > 0 of the\n"
@@ -153,7 +206,8 @@ void exposeWrenchDistribution() {
           "solve", &solve, (bp::arg("self"), bp::arg("wrench"), bp::arg("minimalScale") = 0.),
           "Solves for the forces that give a wrench, (6,): force [N], moment [N·m] about the\n"
           "centre of mass, world axes, or the closest to it. Tolerances are relative to its norm,\n"
-          "but at least to minimalScale [N]. Returns the DistributionStatus.")
+          "but at least to that of a force of minimalScale, >= 0 [N]. Returns the\n"
+          "DistributionStatus.")
       .def("result", &WrenchDistribution::result, bp::arg("self"), Copied(),
            "The last solve()'s DistributionResult, a copy.")
       .def("forgetForces", &WrenchDistribution::forgetForces, bp::arg("self"),
@@ -162,6 +216,7 @@ void exposeWrenchDistribution() {
       .def("computeMargin", &WrenchDistribution::computeMargin, bp::arg("self"),
            "How far the last solve()'s wrench is from what the contacts cannot give: a\n"
            "WrenchMargin. Up to twelve small problems, too much for a control loop.")
+      .def(PrintVisitor<WrenchDistribution>(&writeDistribution))
       .def(CopyVisitor<WrenchDistribution>());
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "dynacom/centroidal.hpp"
 
-#include <limits>
 #include <pinocchio/algorithm/centroidal.hpp>
 
 #include "check.hpp"
+#include "nan.hpp"
 
 namespace dynacom {
 
@@ -55,13 +55,14 @@ Eigen::Vector2d computeFlatGroundCoP(const CentroidalWrench& groundWrench,
   const Eigen::Vector2d cop =
       com.head<2>() + (s_tau - f.head<2>() * (com.z() - groundHeight)) / f.z();  // (5)
   if (!(f.z() >= minimalVerticalForce) || !cop.allFinite())
-    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+    return Eigen::Vector2d::Constant(internal::kNaN);
   return cop;
 }
 
 Eigen::Vector2d computeVRP(const CentroidalState& state, double omega) {
   internal::requireOmega(omega);
-  return state.com.head<2>() - state.acom.head<2>() / (omega * omega);  // (7)
+  const Eigen::Vector2d vrp = state.com.head<2>() - state.acom.head<2>() / (omega * omega);  // (7)
+  return vrp.allFinite() ? vrp : Eigen::Vector2d::Constant(internal::kNaN);
 }
 
 }  // namespace dynacom

@@ -2,14 +2,11 @@
 #include "dynacom/contact_base.hpp"
 
 #include "check.hpp"
+#include "nan.hpp"
 
 namespace dynacom {
 
-namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-}  // namespace
+using internal::kNaN;
 
 void ContactBase::updateNewtonEuler(const Eigen::Vector3d& com, const SE3& oMs) {
   pose_ = oMs;
@@ -46,13 +43,14 @@ double ContactBase::getCoPMargin() const { return kNaN; }
 double ContactBase::getYawUsage() const { return kNaN; }
 
 double ContactBase::getUsage(double tangential, double coefficient) const {
-  if (force_.isZero(0.)) return 0.;
   if (!(coefficient > 0.)) return kNaN;
+  if (force_.isZero(0.)) return 0.;
   if (!(force_[2] > 0.)) return std::numeric_limits<double>::infinity();
   return tangential / (coefficient * force_[2]);
 }
 
 void ContactBase::reset(Eigen::Index uni_rows, Eigen::Index fri_rows, Eigen::Index cols) {
+  if (cols != 3 && cols != 6) internal::throwInvalid("cols must be 3 or 6, got ", cols);
   uni_A_.setZero(uni_rows, cols);
   uni_b_.setZero(uni_rows);
   fri_A_.setZero(fri_rows, cols);

@@ -3,22 +3,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <ostream>
 #include <pinocchio/algorithm/center-of-mass.hpp>
 #include <pinocchio/algorithm/frames.hpp>
 #include <utility>
 
 #include "check.hpp"
+#include "nan.hpp"
 #include "urdf.hpp"
 
 namespace dynacom {
 
+using internal::kNaN;
 using internal::throwInvalid;
 
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // Turns a mass into the force that distributions are compared with, whatever gravity is [m/s²].
 constexpr double kStandardGravity = 9.81;
 
@@ -109,8 +109,7 @@ void DynaCoM::forgetMotion() {
   state_ = unknownState(kNaN);
   ground_wrench_ = {nan, nan};
   ext_wrench_.setConstant(kNaN);
-  feasible_ = state_;
-  distributed_by_dynamics_ = false;
+  feasible_ = pressing_ = state_;
   cop_ = vrp_ = nl_ = nan.head<2>();
   WrenchDistribution unsolved;
   unsolved.setWrenchWeights(getWrenchWeights());
@@ -140,32 +139,35 @@ void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const Vect
   updateFrames();
   state_ = computeCentroidalState(model_, data_, q, v, a);
   ext_wrench_ = extWrench;
-  if (!q.allFinite() || !v.allFinite() || !a.allFinite() || !extWrench.allFinite() ||
-      !isFinite(state_)) {
+  ground_wrench_ = computeGroundWrench(state_, settings_.gravity, ext_wrench_);
+  const bool known = q.allFinite() && v.allFinite() && a.allFinite() && extWrench.allFinite() &&
+                     isFinite(state_) && ground_wrench_.force.allFinite() &&
+                     ground_wrench_.torque.allFinite();
+  if (!known) {
     // There is a motion, of which nothing is known: not even what happens to be finite.
     state_ = unknownState(mass_);
     vrp_ = nl_ = Eigen::Vector2d::Constant(kNaN);
     ext_wrench_.setConstant(kNaN);
+    ground_wrench_ = computeGroundWrench(state_, settings_.gravity, ext_wrench_);
   }
-  ground_wrench_ = computeGroundWrench(state_, settings_.gravity, ext_wrench_);
   for (const Entry& entry : contacts_) place(*entry.contact, state_.com);
 
   feasible_ = unknownState(mass_);
-  distributed_by_dynamics_ = !flatHorizontalGround;
+  pressing_ = state_;
   if (flatHorizontalGround) {
     cop_ =
         computeFlatGroundCoP(ground_wrench_, state_.com, ground_height_, minimal_vertical_force_);
   } else {
     distributeForce(ground_wrench_.force, ground_wrench_.torque, state_.com);
-    cop_ = isFinite(state_) ? computePressureCentre()
-                            : Eigen::Vector2d(Eigen::Vector2d::Constant(kNaN));
+    pressing_ = feasible_;
+    cop_ = known ? computePressureCentre() : Eigen::Vector2d(Eigen::Vector2d::Constant(kNaN));
   }
 }
 
 void DynaCoM::computeNL(double omega) {
   requireInitialized();
   if (!hasMotion()) throw NotReadyError("DynaCoM::computeNL needs computeDynamics() before");
-  vrp_ = computeVRP(distributed_by_dynamics_ ? feasible_ : state_, omega);
+  vrp_ = computeVRP(pressing_, omega);
   nl_ = cop_ - vrp_;  // (8)
 }
 
@@ -199,8 +201,8 @@ void DynaCoM::addContact(const std::shared_ptr<ContactBase>& contact, const std:
 void DynaCoM::removeContact(const std::string& name) {
   const auto entry = find(name);
   entry->contact->deactivate();
+  if (entry->active) distribution_.forgetForces();
   contacts_.erase(entry);
-  distribution_.forgetForces();
 }
 
 void DynaCoM::activateContact(const std::string& name) {
@@ -347,8 +349,10 @@ Eigen::Vector2d DynaCoM::computePressureCentre() const {
     moment += force * surface.act(Eigen::Vector3d(cop.x(), cop.y(), 0.)).head<2>();
     vertical_force += force;
   }
-  if (!(vertical_force >= minimal_vertical_force_)) return Eigen::Vector2d::Constant(kNaN);
-  return moment / vertical_force;
+  const Eigen::Vector2d centre = moment / vertical_force;
+  if (!(vertical_force >= minimal_vertical_force_) || !centre.allFinite())
+    return Eigen::Vector2d::Constant(kNaN);
+  return centre;
 }
 
 template <class Rows, class Block>

@@ -3,17 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "check.hpp"
+#include "nan.hpp"
 
 namespace dynacom {
 
+using internal::kNaN;
 using internal::throwInvalid;
 
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // How far a quaternion's squared norm may be from 1: files are often rounded to a few digits.
 constexpr double kNormalized = 1e-3;
 // How many frames pass between two calls of AnalysisSettings::progress.

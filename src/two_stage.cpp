@@ -15,6 +15,8 @@ template <class Scalar>
 constexpr Scalar kRoundoff =
     std::numeric_limits<Scalar>::digits > std::numeric_limits<double>::digits ? 1e-3 : 1.;
 template <class Scalar>
+constexpr Scalar kRoundoffRoot = kRoundoff<Scalar> < 1 ? 1e-2 : 1.;
+template <class Scalar>
 struct Tolerances {
   // What part of an inequality's normal outside the span of the active ones is none: at the first
   // attempt, and later on.
@@ -25,19 +27,17 @@ struct Tolerances {
   // How far an answer may be from its wrench and from its inequalities: at the first attempt, and
   // after the relaxation.
   static constexpr Scalar kExactWrench = 1e-9;
-  static constexpr Scalar kExactInequality = 2e-12;
+  static constexpr Scalar kExactInequality = 2e-12 * kRoundoff<Scalar>;
   static constexpr Scalar kAccurateWrench = 5e-9;
-  static constexpr Scalar kAccurateInequality = 1e-10;
+  static constexpr Scalar kAccurateInequality = 1e-10 * kRoundoff<Scalar>;
   // What is left of a vector when others are projected out is none below this part of it.
   static constexpr Scalar kDependent = 1e-10 * kRoundoff<Scalar>;
-  // Where the relaxation multiplies an inequality by less than this part of the distance, or by
-  // less than this, it is rounding.
-  static constexpr Scalar kMultiplied = 1e-10 * kRoundoff<Scalar>;
-  static constexpr Scalar kMultiplierRounding = 3e-12 * kRoundoff<Scalar>;
+  // Where the relaxation multiplies an inequality by less than this, it is rounding, too.
+  static constexpr Scalar kMultiplierRounding = kRoundoff<Scalar> < 1 ? kLeastMultiplier : 3e-12;
   // Of the relaxation: its √δ, how many steps it may take, when it has arrived, and what does not
   // approach an inequality.
-  static constexpr Scalar kProximity = 1e-4;
-  static constexpr Scalar kLeastProximity = 1e-7;
+  static constexpr Scalar kProximity = 1e-4 * kRoundoffRoot<Scalar>;
+  static constexpr Scalar kLeastProximity = 1e-7 * kRoundoffRoot<Scalar>;
   static constexpr int kEasySteps = 2;
   static constexpr int kProximalSteps = 100;
   static constexpr Scalar kProximalChange = 1e-11 * kRoundoff<Scalar>;
@@ -45,8 +45,10 @@ struct Tolerances {
   static constexpr int kStalledSteps = 2;
   static constexpr Scalar kRounding = 1e-15 * kRoundoff<Scalar>;
   static constexpr Scalar kParallel = 1e-9 * kRoundoff<Scalar>;
+  // A distance that has few digits, where the wrench weights are equal.
+  static constexpr Scalar kNearBoundary = 1e-5;
   // Of the cheapest forces on a face: √ε, how many steps, and when nothing is missing any more.
-  static constexpr Scalar kSlack = 1e-4;
+  static constexpr Scalar kSlack = 1e-4 * kRoundoffRoot<Scalar>;
   static constexpr int kMultiplierSteps = 100;
   static constexpr Scalar kMissing = 1e-11 * kRoundoff<Scalar>;
   static constexpr Scalar kLeastShrinking = 1e-5;
@@ -229,11 +231,15 @@ bool TwoStageSolver<Scalar>::relax(const Vector6& target) {
   for (int step = 0; step < Tolerances<Scalar>::kProximalSteps; ++step) {
     slackened_.d = proximity * (target - giveScaled(scaled_)).cwiseQuotient(slackened_.norms);
     slackened_.h.noalias() = -proximity * (slackened_.G.bottomRows(n_).transpose() * scaled_);
-    const Scalar tolerance = std::max(Tolerances<Scalar>::kRounding * distance_.norm(),
-                                      proximity * Tolerances<Scalar>::kRounding);
-    const Status status = solver.solve(slackened_.E, slackened_.d, slackened_.G, slackened_.h,
-                                       tolerance, Tolerances<Scalar>::kDependentInequality);
-    iterations_ += solver.iterations();
+    Scalar tolerance = Tolerances<Scalar>::kRounding * std::max(distance_.norm(), proximity);
+    // Less than what rounding leaves behind, a tolerance can keep the solver going in circles.
+    Status status = Status::IterationLimit;
+    for (int attempt = 0; attempt < 3 && status == Status::IterationLimit; ++attempt) {
+      status = solver.solve(slackened_.E, slackened_.d, slackened_.G, slackened_.h, tolerance,
+                            Tolerances<Scalar>::kDependentInequality);
+      iterations_ += solver.iterations();
+      tolerance *= 100;
+    }
     if (status != Status::Solved) return false;
     distance_ = solver.x().template head<6>();
     change_ = solver.x().tail(n_) / proximity;
@@ -285,8 +291,8 @@ typename TwoStageSolver<Scalar>::Vector6 TwoStageSolver<Scalar>::giveScaled(
 // variables.
 template <class Scalar>
 void TwoStageSolver<Scalar>::restrictToFace() {
-  const Scalar least = std::max(Tolerances<Scalar>::kMultiplied * distance_.norm(),
-                                Tolerances<Scalar>::kMultiplierRounding);
+  const Scalar least =
+      std::max(Scalar(kMultiplied) * distance_.norm(), Tolerances<Scalar>::kMultiplierRounding);
   face_.setZero(n_, n_);
   R_.setZero(n_, n_);
   Eigen::Index col = 0, row = 0;
@@ -372,6 +378,12 @@ DistributionStatus TwoStageSolver<Scalar>::solve(const Vector6& wrench) {
                       Tolerances<Scalar>::kAccurateInequality)
              ? DistributionStatus::Solved
              : DistributionStatus::NumericalFailure;
+}
+
+template <class Scalar>
+bool TwoStageSolver<Scalar>::isNearBoundary() const {
+  const Scalar spread = weights_.maxCoeff() / weights_.minCoeff();
+  return on_face_ && distance_.norm() < Tolerances<Scalar>::kNearBoundary * spread;
 }
 
 template <class Scalar>

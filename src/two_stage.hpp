@@ -12,6 +12,10 @@ namespace dynacom::internal {
 // A wrench no farther than this from what the contacts can give, over its own size, is within
 // reach.
 constexpr double kReach = 1e-8;
+// Where the first stage multiplies an inequality by less than this part of the distance, or by less
+// than this, it is rounding.
+constexpr double kMultiplied = 1e-10;
+constexpr double kLeastMultiplier = 1e-14;
 
 /// The two stages of a wrench distribution, robust rather than fast: the reachable wrench closest
 /// to the one that is asked for, then the cheapest forces that give it.
@@ -48,7 +52,10 @@ class TwoStageSolver {
   /// @param overall_weight  the wrench weights over those of setProblem()
   void writeAnswer(DistributionResult& result, double unit, double overall_weight);
 
-  bool relaxed() const { return on_face_; }
+  /// Whether the answer of solve() is that of a wrench next to the boundary of what is reachable,
+  /// where the multipliers of the first stage have few digits.
+  bool isNearBoundary() const;
+
   /// How often the active set has changed in the last solve().
   int iterations() const { return iterations_; }
 

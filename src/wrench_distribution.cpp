@@ -13,6 +13,8 @@ namespace dynacom {
 
 namespace {
 
+using internal::kLeastMultiplier;
+using internal::kMultiplied;
 using internal::kReach;
 using internal::throwInvalid;
 using internal::TwoStageSolver;
@@ -90,18 +92,37 @@ Eigen::VectorXd DistributionResult::forces() const {
 }
 
 bool DistributionResult::isOptimal(double tolerance) const {
-  const double unit = scale / overallWeight(wrench_weights, wrench);  // of forces
-  const bool relaxed = status == DistributionStatus::Relaxed;
-  if (!relaxed && status != DistributionStatus::Solved && status != DistributionStatus::NoContact)
-    return false;
-
+  const double overall_weight = overallWeight(wrench_weights, wrench);
+  const double unit = scale / overall_weight;  // of forces
   const double size = weighted(wrench_weights, residual).norm();
+  const double within_reach = kReach * scale;
+  switch (status) {
+    case DistributionStatus::Solved:
+      if (!(size <= within_reach * (1. + tolerance))) return false;
+      break;
+    case DistributionStatus::Relaxed:
+      if (!(size >= within_reach * (1. - tolerance))) return false;
+      break;
+    case DistributionStatus::NoContact:
+      return contacts.empty() && size > within_reach && achieved.isZero(0.);
+    default:
+      return false;
+  }
+
+  // The relaxation's multipliers say what holds on the face of the closest wrench. They are to be
+  // believed where they are more than rounding, and what they must be themselves is looked at.
   const Vector6 pull = weighted(wrench_weights.cwiseAbs2(), residual);
-  if (status == DistributionStatus::Solved && !(size <= kReach * scale * (1. + tolerance)))
+  const double least_of_distance =
+      overall_weight * std::max(kMultiplied * size, kLeastMultiplier * scale);
+  bool relaxed = status == DistributionStatus::Relaxed;
+  for (const Contact& contact : contacts)
+    relaxed = relaxed || !contact.relaxation_multipliers.isZero(0.);
+  if (relaxed &&
+      !(std::abs(pull.dot(achieved)) <= (tolerance * size + kPullRounding * scale) * scale))
     return false;
-  if (relaxed && !(std::abs(pull.dot(achieved)) <= tolerance * scale * size)) return false;
 
   Vector6 given = Vector6::Zero();
+  double all_costs = 0., complementarity = 0., nothing = 0.;
   for (const Contact& contact : contacts) {
     given += contact.NE * contact.force;
     const auto cost_weights = contact.weights.cwiseAbs2();
@@ -116,12 +137,12 @@ bool DistributionResult::isOptimal(double tolerance) const {
                              kPullRounding * unit * wrench_weights.cwiseAbs2().maxCoeff()) *
                             std::max(1., contact.NE.lpNorm<Eigen::Infinity>());
     for (Eigen::Index i = 0; i < contact.force.size(); ++i) {
-      const double gradient = cost_weights[i] * contact.force[i] -
-                              contact.NE.col(i).dot(wrench_multipliers) +
-                              contact.A.col(i).dot(contact.multipliers);
+      const double of_cost = cost_weights[i] * contact.force[i] -
+                             contact.NE.col(i).dot(wrench_multipliers) +
+                             contact.A.col(i).dot(contact.multipliers);
       const double of_distance =
           contact.NE.col(i).dot(pull) - contact.A.col(i).dot(contact.relaxation_multipliers);
-      if (!(std::abs(gradient) <= tolerance * terms)) return false;
+      if (!(std::abs(of_cost) <= tolerance * terms)) return false;
       if (relaxed && !(std::abs(of_distance) <= rounding)) return false;
     }
     for (Eigen::Index j = 0; j < contact.A.rows(); ++j) {
@@ -129,11 +150,15 @@ bool DistributionResult::isOptimal(double tolerance) const {
       const double multiplier = contact.multipliers[j];
       const double of_distance = contact.relaxation_multipliers[j];
       if (!(slack <= tolerance * unit) || !(of_distance >= 0.)) return false;
-      if (!(of_distance > 0.) && !(multiplier >= -tolerance * terms)) return false;
+      if (!(of_distance > least_of_distance) && !(multiplier >= -tolerance * terms)) return false;
       if (multiplier != 0. && !(std::abs(slack) <= tolerance * unit)) return false;
+      complementarity += std::abs(multiplier * slack);
     }
+    all_costs += cost_weights.dot(contact.force.cwiseAbs2());
+    nothing = std::max(nothing, kNegligible * unit * contact.weights.maxCoeff());
   }
-  return weighted(wrench_weights, given - achieved).norm() <= tolerance * scale &&
+  return complementarity <= tolerance * (all_costs + nothing * nothing) &&
+         weighted(wrench_weights, given - achieved).norm() <= tolerance * scale &&
          weighted(wrench_weights, wrench - achieved - residual).norm() <= tolerance * scale;
 }
 
@@ -159,6 +184,7 @@ struct WrenchDistribution::Workspace {
   bool distributeBy(TwoStageSolver<Scalar>& solver);
   void keepAnswer();
   void sumUp();
+  bool findDistance(const Vector6& target, Vector6& distance);
   double findBoundary(const Vector6& wrench, const Vector6& direction, double bound);
 };
 
@@ -198,8 +224,9 @@ Contact& WrenchDistribution::Workspace::nextContact() {
 
 void WrenchDistribution::add(const ContactBase& contact) {
   if (contact.cols() == 0) throwInvalid("a contact was never initialised");
-  if (!(contact.uni_b().array() == 0.).all() || !(contact.fri_b().array() == 0.).all())
-    throwInvalid("uni_b and fri_b of contact '", contact.getFrameName(), "' must be zero");
+  if (contact.ne_A().isZero(0.))
+    throw NotReadyError("contact '" + contact.getFrameName() +
+                        "' is used before updateNewtonEuler()");
   Contact& next = work_->nextContact();
   next.A.resize(contact.uni_rows() + contact.fri_rows(), contact.cols());
   next.A.topRows(contact.uni_rows()) = contact.uni_A();
@@ -251,7 +278,7 @@ void WrenchDistribution::Workspace::takeProblem() {
 // Returns false if there is no answer.
 bool WrenchDistribution::Workspace::distribute() {
   const bool answered = distributeBy(solver);
-  if (answered && result.isOptimal(kProof) && !(solver.relaxed() && weighted(settings, result.residual).norm() < 1e-5 * result.scale)) return true;
+  if (answered && !solver.isNearBoundary() && result.isOptimal(kProof)) return true;
   const DistributionStatus status = result.status;
   if (distributeBy(accurate_solver)) return true;
   result.status = status;
@@ -293,6 +320,8 @@ void WrenchDistribution::Workspace::sumUp() {
 }
 
 DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minimalScale) {
+  if (std::isfinite(minimalScale) && minimalScale < 0.)
+    throwInvalid("minimalScale must be >= 0 N, got ", minimalScale);
   Workspace& work = *work_;
   DistributionResult& result = work.result;
   result.wrench = wrench;
@@ -300,7 +329,8 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   const Vector6& weights = work.settings;
   result.wrench_weights = weights;
   work.overall_weight = overallWeight(weights, wrench);
-  result.scale = std::max(minimalScale, normOf(weighted(weights, wrench)));
+  result.scale =
+      std::max(minimalScale * weights.head<3>().maxCoeff(), normOf(weighted(weights, wrench)));
   work.unit = result.scale / work.overall_weight;
   work.wrench_weights = weights / work.overall_weight;
   work.takeProblem();
@@ -332,6 +362,17 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   return result.status;
 }
 
+// What is missing of a weighted wrench at the closest reachable one. False if that fails.
+bool WrenchDistribution::Workspace::findDistance(const Vector6& target, Vector6& distance) {
+  if (solver.relax(target)) {
+    distance = solver.distance();
+    return true;
+  }
+  if (!accurate_solver.relax(target.cast<long double>())) return false;
+  distance = accurate_solver.distance().cast<double>();
+  return true;
+}
+
 // The largest s, but for what is above a bound, for which a wrench plus s times a direction is
 // reachable; all of them weighted and over the unit. From a point beyond, the plane between it and
 // the reachable wrenches cuts the line closer to where it leaves them, until it is there. Negative
@@ -343,8 +384,8 @@ double WrenchDistribution::Workspace::findBoundary(const Vector6& wrench, const 
     // Only the direction of what is out of reach matters, because the reachable is a cone.
     const Vector6 target = std::isfinite(s) ? Vector6(wrench + s * direction) : direction;
     if (target.norm() <= kMarginReach) break;  // no wrench at all
-    if (!solver.relax(target / target.norm())) return -1.;
-    const Vector6& distance = solver.distance();
+    Vector6 distance;
+    if (!findDistance(target / target.norm(), distance)) return -1.;
     if (distance.norm() <= kMarginReach) break;
     const double cut = std::max(0., -distance.dot(wrench) / distance.dot(direction));
     if (!(cut < s * (1. - kMarginChange))) break;
@@ -368,6 +409,7 @@ WrenchMargin WrenchDistribution::computeMargin() {
   Vector6 wrench = weighted(work.wrench_weights, result.achieved);
   if (work.unit > 0.) wrench /= work.unit;
   work.solver.setProblem(result.contacts, work.wrench_weights);
+  work.accurate_solver.setProblem(result.contacts, work.wrench_weights);
   double least = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 6; ++axis) {
     for (const int sign : {1, -1}) {

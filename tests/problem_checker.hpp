@@ -16,10 +16,6 @@ struct Verdict {
   double residual = 0.;      ///< norm of the residual
   double residual_gap = 0.;  ///< by how much that could be above the least, at most
   double cost_gap = 0.;      ///< by which part of the cost that could be above the least, at most
-  /// Whether that is certain only of a wrench that differs by 1e-12 of the scale, or, within 1e-8
-  /// of what is reachable, by 1 % of the distance: on the boundary the least cost may depend on the
-  /// last digits.
-  bool doubtful = false;
 };
 
 /// Certifies forces by weak duality. Each contact's cone is spanned by its corners, so that the

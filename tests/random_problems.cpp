@@ -189,8 +189,11 @@ Problem ProblemGenerator::next() {
   const double weight = powerOfTen(-6., 6.);
   for (ProblemContact& contact : problem.contacts) contact.weights *= weight;
   problem.wrench_weights.setOnes();
-  if (oneIn(4))
-    for (double& wrench_weight : problem.wrench_weights) wrench_weight = powerOfTen(-1., 1.);
+  if (oneIn(4)) {
+    const double decades = oneIn(2) ? 2. : 1.;
+    for (double& wrench_weight : problem.wrench_weights)
+      wrench_weight = powerOfTen(-decades, decades);
+  }
 
   problem.place = static_cast<Place>(integer(0, 4));
   if (oneIn(50)) problem.place = Place::Nothing;

@@ -14,8 +14,7 @@ using dynacom::DistributionStatus;
 namespace {
 
 struct Tally {
-  long problems = 0, solved = 0, relaxed = 0, failures = 0, wrong = 0, doubtful = 0,
-       not_optimal = 0;
+  long problems = 0, solved = 0, relaxed = 0, failures = 0, wrong = 0, not_optimal = 0;
   int iterations = 0;
   Verdict worst;
 
@@ -24,33 +23,36 @@ struct Tally {
     solved += result.status == DistributionStatus::Solved;
     relaxed += result.status == DistributionStatus::Relaxed;
     failures += result.status == DistributionStatus::NumericalFailure;
-    wrong += !verdict.error.empty() || !result.isOptimal(1e-6);
-    doubtful += verdict.doubtful;
+    wrong += !verdict.error.empty();
     not_optimal += !result.isOptimal(1e-6);
     iterations = std::max(iterations, result.iterations);
     worst.outside_cone = std::max(worst.outside_cone, verdict.outside_cone);
     worst.residual_gap = std::max(worst.residual_gap, verdict.residual_gap);
-    if (!verdict.doubtful) worst.cost_gap = std::max(worst.cost_gap, verdict.cost_gap);
+    worst.cost_gap = std::max(worst.cost_gap, verdict.cost_gap);
     if (result.status == DistributionStatus::Solved)
       worst.residual = std::max(worst.residual, verdict.residual);
   }
 
   void print(const char* name) const {
-    std::printf(
-        "| %s | %ld | %ld | %ld | %ld | %ld | %ld | %ld | %.1e | %.1e | %.1e | %.1e | %d |\n", name,
-        problems, solved, relaxed, failures, wrong, doubtful, not_optimal, worst.outside_cone,
-        worst.residual, worst.residual_gap, worst.cost_gap, iterations);
+    std::printf("| %s | %ld | %ld | %ld | %ld | %ld | %ld | %.1e | %.1e | %.1e | %.1e | %d |\n",
+                name, problems, solved, relaxed, failures, wrong, not_optimal, worst.outside_cone,
+                worst.residual, worst.residual_gap, worst.cost_gap, iterations);
   }
 };
 
 }  // namespace
 
-// usage: reliability [PROBLEMS [SEED]]. Fails if more answers than 1 in 20,000 are not certified;
-// with nearly parallel contacts, 1 in 500.
+// usage: reliability [PROBLEMS [SEED]]. Fails if an answer is not certified; with nearly parallel
+// contacts, where costs may depend on digits that doubles do not have, if there is no answer, or
+// more than 1 in 1,000 are not.
 int main(int argc, char** argv) {
   const long problems = argc > 1 ? std::atol(argv[1]) : 1000;
-  const unsigned long seed = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1;
-  ProblemGenerator generator(seed);
+  const long seed = argc > 2 ? std::atol(argv[2]) : 1;
+  if (problems < 1 || seed < 1 || argc > 3) {
+    std::fprintf(stderr, "usage: reliability [PROBLEMS [SEED]], both > 0\n");
+    return 2;
+  }
+  ProblemGenerator generator(static_cast<unsigned long>(seed));
   std::array<Tally, kPlaceNames.size()> tallies;
   Tally all, nearly_parallel;
   for (long i = 0; i < problems; ++i) {
@@ -59,7 +61,9 @@ int main(int argc, char** argv) {
     distribution.setWrenchWeights(problem.wrench_weights);
     for (const auto& contact : problem.makeContacts()) distribution.add(*contact);
     distribution.solve(problem.wrench, problem.minimal_scale);
-    const Verdict verdict = check(problem, distribution.result());
+    Verdict verdict = check(problem, distribution.result());
+    if (verdict.error.empty() && !distribution.result().isOptimal(1e-6))
+      verdict.error = "right, but not optimal by itself";
     const auto place = static_cast<std::size_t>(problem.place);
     if (problem.nearly_parallel) {
       nearly_parallel.add(distribution.result(), verdict);
@@ -76,12 +80,13 @@ int main(int argc, char** argv) {
                    verdict.outside_cone, verdict.residual, verdict.residual_gap, verdict.cost_gap);
   }
   std::printf(
-      "| wrench | problems | Solved | Relaxed | failures | wrong | doubtful | not optimal | "
+      "| wrench | problems | Solved | Relaxed | failures | wrong | not optimal | "
       "outside "
       "cone | residual of Solved | residual gap | cost gap | iterations |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (std::size_t i = 0; i < tallies.size(); ++i) tallies[i].print(kPlaceNames[i]);
   all.print("all of these");
   nearly_parallel.print("nearly parallel contacts");
-  return 20000 * all.wrong > problems || 500 * nearly_parallel.wrong > nearly_parallel.problems;
+  return all.wrong + nearly_parallel.failures > 0 ||
+         1000 * nearly_parallel.wrong > nearly_parallel.problems;
 }

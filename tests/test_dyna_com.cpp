@@ -644,6 +644,13 @@ BOOST_AUTO_TEST_CASE(the_virtual_repellent_point_is_of_the_motion_that_presses) 
     BOOST_TEST(close(dynacom.getVRP(), vrpBy(x, feasible.head<3>()), 1e-9));
     if (!dynacom.isCoPDefined()) continue;
     BOOST_TEST(close(dynacom.getNL(), dynacom.getCoP() - dynacom.getVRP()));
+    // Another distribution is not what p and v are of: both stay those of the same motion.
+    const Vector2d nl = dynacom.getNL(), vrp = dynacom.getVRP();
+    distribute(dynacom, 2. * dynacom.getDistribution().wrench, dynacom.getCoM());
+    BOOST_REQUIRE(!close(dynacom.getFeasibleACoM(), feasible.head<3>(), 1e-3));
+    dynacom.computeNL(omega);
+    BOOST_TEST(close(dynacom.getVRP(), vrp, 0.));
+    BOOST_TEST(close(dynacom.getNL(), nl, 0.));
   }
   BOOST_TEST(relaxed > 5);
   BOOST_TEST(relaxed < 20);
@@ -1328,6 +1335,8 @@ BOOST_AUTO_TEST_CASE(forces_are_not_kept_when_contacts_or_settings_have_changed)
   BOOST_CHECK_THROW(biped.right->setMu(-1.), std::invalid_argument);
   BOOST_CHECK_THROW(biped.right->initialize({}), std::invalid_argument);
   BOOST_CHECK_THROW(biped.dynacom.setWrenchWeights(Vector6::Zero()), std::invalid_argument);
+  biped.dynacom.addContact(makePoint("sole0"), "idle", false);
+  biped.dynacom.removeContact("idle");
   BOOST_CHECK_THROW(biped.dynacom.addContact(biped.left, "left"), std::invalid_argument);
   BOOST_CHECK_THROW(biped.dynacom.removeContact("tail"), std::invalid_argument);
   biped.dynacom.activateContact("left");

@@ -361,22 +361,19 @@ bool isZero(const VectorXd& numbers) { return (numbers.array() == 0.).all(); }
 /// Left and right sole, the CoM between them on the ground.
 Contacts twoSoles() { return {makeSole({0., 0.1, 0.}), makeSole({0., -0.1, 0.})}; }
 
-/// A contact of a kind that the library does not know: a magnet, which holds against a pull.
-class Magnet : public ContactBase {
+/// A contact of a kind that the library does not know, with as many components as is said.
+class Hook : public ContactBase {
  public:
-  Magnet(double pull, double grip) {
-    reset(1, 4, 6);
-    uni_A_ << 0, 0, -1, 0, 0, 0;
-    uni_b_ << pull;
-    fri_A_.topLeftCorner<4, 2>() << 1, 0, 0, 1, -1, 0, 0, -1;
-    fri_b_.setConstant(grip);
+  explicit Hook(Index cols) {
+    reset(1, 0, cols);
+    uni_A_(0, 2) = -1.;
     reg_A_.setOnes();
   }
-  std::shared_ptr<ContactBase> clone() const override { return std::make_shared<Magnet>(*this); }
+  std::shared_ptr<ContactBase> clone() const override { return std::make_shared<Hook>(*this); }
   const std::string& getFrameName() const override { return name_; }
 
  private:
-  std::string name_ = "magnet";
+  std::string name_ = "hook";
 };
 
 /// Another: a hand that can give what is within a random cone, in which a force lies.
@@ -697,11 +694,13 @@ BOOST_AUTO_TEST_CASE(wrench_weights_are_one_by_default_and_their_common_scale_me
     const Vector6 total = random.vector(6, 500.);
     WrenchDistribution plain, scaled;
     const auto status = solve(plain, contacts, total);
-    for (const double scale : {1e-6, 1., 1e6}) {
+    for (const double scale : {1e-8, 1., 1e8}) {
       BOOST_TEST_CONTEXT("weights of " << scale) {
         scaled.setWrenchWeights(Vector6::Constant(scale));
-        BOOST_TEST(solve(scaled, contacts, total) == status);
-        BOOST_TEST(close(scaled.result().forces(), plain.result().forces(), 1e-7));
+        for (const double minimalScale : {0., 1000.}) {
+          BOOST_TEST(solve(scaled, contacts, total, minimalScale) == status);
+          BOOST_TEST(close(scaled.result().forces(), plain.result().forces(), 1e-7));
+        }
       }
     }
   }
@@ -830,18 +829,19 @@ BOOST_AUTO_TEST_CASE(any_cone_is_taken_with_its_own_inequalities) {
   BOOST_TEST(relaxed > 50);
 }
 
-BOOST_AUTO_TEST_CASE(inequalities_that_do_not_end_at_the_origin_are_refused) {
-  WrenchDistribution distribution;
-  for (const auto& contact : twoSoles()) distribution.add(*contact);
-  for (const auto& [pull, grip] : {std::make_pair(50., 0.), {-50., 0.}, {0., 25.}, {kNaN, 0.}})
-    BOOST_TEST(throws<std::invalid_argument>(
-        [&, pull = pull, grip = grip] { distribution.add(Magnet(pull, grip)); },
-        {"uni_b", "fri_b", "magnet"}));
-  BOOST_TEST(distribution.solve(wrench(0., 0., 500.)) == DistributionStatus::Solved);
-  BOOST_TEST(distribution.result().contacts.size() == 2u);
-  // Without its pull, it is a contact like others.
-  distribution.clear();
-  BOOST_CHECK_NO_THROW(distribution.add(Magnet(0., 0.)));
+BOOST_AUTO_TEST_CASE(contacts_of_other_kinds_are_forces_or_wrenches) {
+  for (const Index cols : {-1, 0, 1, 2, 4, 5, 7})
+    BOOST_TEST(throws<std::invalid_argument>([cols = cols] { Hook hook(cols); },
+                                             {"cols", std::to_string(cols).c_str()}));
+  for (const Index cols : {3, 6}) {
+    // Nothing but a pull upwards, whatever the other components are.
+    WrenchDistribution distribution;
+    Hook hook(cols);
+    hook.updateNewtonEuler(Vector3d::Zero(), SE3::Identity());
+    distribution.add(hook);
+    BOOST_TEST(distribution.solve(wrench(-30., 0., 500.)) == DistributionStatus::Solved);
+    BOOST_TEST(close(distribution.result().forces().head<3>(), Vector3d(-30., 0., 500.)));
+  }
 }
 
 /// A force at a corner of a contact's cone.
@@ -934,10 +934,26 @@ BOOST_AUTO_TEST_CASE(without_contacts_nothing_but_a_free_flight_is_solved) {
     check(0.99e-6 * Vector6::Unit(i), 100., DistributionStatus::Solved);
     check(-1.01e-6 * Vector6::Unit(i), 100., DistributionStatus::NoContact);
   }
-  // The size is that in the wrench's norm.
-  distribution.setWrenchWeights(Vector6::Constant(10.));
-  check(wrench(0., 0., 0.99e-7), 100., DistributionStatus::Solved);
-  check(wrench(0., 0., 1.01e-7), 100., DistributionStatus::NoContact);
+  // Both sizes are those in the wrench's norm, whose common factor means nothing.
+  for (const double factor : {1e-8, 10., 1e8}) {
+    distribution.setWrenchWeights(factor * Vector6::Ones());
+    check(wrench(0., 0., 0.99e-6), 100., DistributionStatus::Solved);
+    check(wrench(0., 0., 1.01e-6), 100., DistributionStatus::NoContact);
+    distribution.setWrenchWeights(factor * (Vector6() << 0.1, 1., 0.5, 2., 2., 2.).finished());
+    check(wrench(0., 0., 1.99e-6), 100., DistributionStatus::Solved);
+    check(wrench(0., 0., 2.01e-6), 100., DistributionStatus::NoContact);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(what_was_never_placed_or_has_no_size_is_refused) {
+  WrenchDistribution distribution;
+  Hook hook(6);
+  BOOST_TEST(throws<NotReadyError>([&] { distribution.add(hook); }, {"hook", "updateNewtonEuler"}));
+  hook.setPose(SE3::Identity());  // which leaves NE as it is
+  BOOST_TEST(throws<NotReadyError>([&] { distribution.add(hook); }, {"hook", "updateNewtonEuler"}));
+  BOOST_TEST(throws<std::invalid_argument>([&] { distribution.solve(wrench(0., 0., 500.), -1.); },
+                                           {"minimalScale", ">= 0", "-1"}));
+  BOOST_TEST(distribution.solve(wrench(0., 0., 500.)) == DistributionStatus::NoContact);
 }
 
 BOOST_AUTO_TEST_CASE(before_the_first_solve_numbers_are_nan) {
@@ -1329,6 +1345,29 @@ BOOST_AUTO_TEST_CASE(every_condition_of_optimality_is_looked_at) {
   BOOST_TEST(!write(relaxed, 100., 0., 0., none, none, none).isOptimal());
   // They could push less, and come closer.
   BOOST_TEST(!write(relaxed, -50., 100., 50., {50., 50.}, none, {150., 150.}).isOptimal());
+  // The relaxation's multipliers excuse a negative one, but only where they are right.
+  for (const double multiplier : {1e-300, 1e-12, 1.}) {
+    const Vector2d excuse(0., multiplier);
+    DistributionResult result = write(solved, 100., 100., 100., {100., 0.}, {0., -100.}, excuse);
+    BOOST_TEST(!result.isOptimal());
+    result.status = relaxed;
+    BOOST_TEST(!result.isOptimal());
+    // Truly out of reach.
+    result.wrench[0] = result.residual[0] = 50.;
+    result.scale = result.wrench.norm();
+    BOOST_TEST(!result.isOptimal());
+  }
+  // Small slacks times large multipliers: much cheaper forces may be next to these.
+  const double slack = 1e-7;
+  BOOST_TEST(!write(solved, 100., 100., 1e8, {100. - slack, slack}, {1e8, 1e8}, none).isOptimal());
+  // Other names for the same.
+  BOOST_TEST(!write(relaxed, 100., 100., 50., {50., 50.}, none, none).isOptimal());
+  DistributionResult nothing = write(DistributionStatus::NoContact, 100., 0., 0., none, none, none);
+  BOOST_TEST(!nothing.isOptimal());
+  nothing.contacts.clear();
+  BOOST_TEST(nothing.isOptimal());
+  nothing.wrench = nothing.residual = 1e-9 * nothing.wrench;
+  BOOST_TEST(!nothing.isOptimal());
 }
 
 BOOST_AUTO_TEST_CASE(forces_that_are_not_the_cheapest_are_not_optimal) {

@@ -75,7 +75,8 @@ DYNACOM_EXPORT Eigen::Vector2d computeFlatGroundCoP(
     const CentroidalWrench& groundWrench, const Eigen::Vector3d& com, double groundHeight = 0.,
     double minimalVerticalForce = kMinimalVerticalForce);
 
-/// Virtual repellent point on the ground's plane, equation (7): v = c − c̈ / ω² [m].
+/// Virtual repellent point on the ground's plane, equation (7): v = c − c̈ / ω² [m]; NaN where that
+/// is beyond the largest numbers.
 /// @param omega  ω > 0, natural frequency of the linear inverted pendulum [rad/s]
 /// @throws std::invalid_argument unless ω > 0
 DYNACOM_EXPORT Eigen::Vector2d computeVRP(const CentroidalState& state, double omega);

@@ -110,9 +110,9 @@ class DYNACOM_EXPORT ContactBase {
   Eigen::Vector2d getCoP() const;
 
   /// How much of the friction that the applied force allows it uses: the larger of |f_x| and |f_y|
-  /// over μ f_z, 1 on the pyramid. 0 where there is no force; infinite where there is one without a
-  /// positive normal force; NaN where there is no friction to use (μ = 0), and for kinds that know
-  /// of none.
+  /// over μ f_z, 1 on the pyramid. NaN where there is no friction to use (μ = 0), and for kinds
+  /// that know of none; else 0 where there is no force, and infinite where there is one without a
+  /// positive normal force.
   virtual double getFrictionUsage() const;
   /// Distance of getCoP() to the nearest edge of the surface, negative beyond it [m]; NaN unless
   /// the normal force is positive, and for kinds without edges.
@@ -130,13 +130,15 @@ class DYNACOM_EXPORT ContactBase {
   double getUsage(double tangential, double coefficient) const;
 
   /// Gives the matrices their sizes, forgets frame index and force. For initialize().
+  /// @throws std::invalid_argument unless cols is 3, a force, or 6, a force and a moment
   void reset(Eigen::Index uni_rows, Eigen::Index fri_rows, Eigen::Index cols);
 
   Eigen::MatrixXd uni_A_, fri_A_;
-  Eigen::VectorXd uni_b_, fri_b_, reg_A_, reg_b_;
-  Eigen::Matrix<double, 6, Eigen::Dynamic> ne_A_;
+  Eigen::VectorXd reg_A_;
 
  private:
+  Eigen::VectorXd uni_b_, fri_b_, reg_b_;  // zeros: only cones can be projected on
+  Eigen::Matrix<double, 6, Eigen::Dynamic> ne_A_;
   FrameIndex frame_id_ = kUnknownFrame;
   SE3 pose_ = SE3::Identity();
   Eigen::VectorXd force_;

@@ -104,9 +104,13 @@ class DYNACOM_EXPORT DynaCoM {
   ///
   /// with p_k the centre of pressure of contact k and f_k its force. Contacts without load drop
   /// out.
+  ///
+  /// If a number is not finite, or becomes so, all results of the motion are NaN; a distribution on
+  /// uneven ground ends as DistributionStatus::InvalidInput. On flat ground there is none: forces
+  /// and getDistribution() stay those of the last one.
+  /// @param q          configuration, model().nq, its quaternions of norm 1
+  /// @param v, a       velocity and acceleration, model().nv
   /// @param extWrench  (force [N], moment [N·m]) on the robot besides the contacts', about the CoM
-  /// If a number is not finite, or becomes so, all results are NaN, and the distribution, if there
-  /// is one, ends as DistributionStatus::InvalidInput.
   /// @throws std::invalid_argument if a vector has the wrong size; NotReadyError before
   ///         initialize()
   void computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
@@ -190,28 +194,32 @@ class DYNACOM_EXPORT DynaCoM {
   /// Each contact is given its force. What it all amounts to is in getDistribution().
   ///
   /// DistributionStatus says which case it was. Where there is no answer (InvalidInput,
-  /// NumericalFailure), forces are those of the last one, unless contacts were added, removed,
-  /// activated, deactivated or given other settings since: then they are zero.
+  /// NumericalFailure), forces are those of the last one, unless a contact was activated or
+  /// deactivated, or an active one was removed or given other settings since: then they are zero.
   /// @param groundCoMForce   [N]
   /// @param groundCoMTorque  about the CoM [N·m]
-  /// @param com              position of the CoM [m]
+  /// @param com              position of the CoM, which the moments are about [m]; that of
+  ///                         getCoM(), or getFeasibleAMVariation() means nothing
   DistributionStatus distributeForce(const Eigen::Vector3d& groundCoMForce,
                                      const Eigen::Vector3d& groundCoMTorque,
                                      const Eigen::Vector3d& com);
-  /// The last distribution, be it distributeForce()'s or computeDynamics()'s own; its contacts are
-  /// those that were active then, in the order of their activation.
+  /// The last distribution, be it distributeForce()'s or that of computeDynamics() on uneven
+  /// ground; its contacts are those that were active then, in the order of their activation. What
+  /// was computed or activated since has not changed it.
   const DistributionResult& getDistribution() const { return distribution_.result(); }
-  /// Its status: DistributionStatus::NoContact before the first.
+  /// The last distribution's status; DistributionStatus::NoContact before the first.
   DistributionStatus getDistributionStatus() const { return getDistribution().status; }
-  /// How far its wrench is from what the contacts cannot give. For a look, not for a control loop.
+  /// How far the wrench of the last distribution is from what its contacts cannot give. Takes many
+  /// times as long as a distribution.
   WrenchMargin computeWrenchMargin() { return distribution_.computeMargin(); }
 
   /// Of the last distribution, for a contact: its centre of pressure, in its surface's plane [m];
   /// NaN where its normal force is below getMinimalVerticalForce().
   /// @throws std::invalid_argument if the name is not known, as the next three
   Eigen::Vector2d getContactCoP(const std::string& name) const;
-  /// ContactBase::getFrictionUsage(), getCoPMargin() and getYawUsage(): 0, NaN [m] and 0 where the
-  /// normal force is below getMinimalVerticalForce().
+  /// ContactBase::getFrictionUsage(), getCoPMargin() [m] and getYawUsage(). Where the normal force
+  /// is below getMinimalVerticalForce(), the margin is NaN, and a usage 0, unless it is NaN for all
+  /// forces of the contact.
   double getContactFrictionUsage(const std::string& name) const;
   double getContactCoPMargin(const std::string& name) const;
   double getContactYawUsage(const std::string& name) const;
@@ -272,7 +280,7 @@ class DYNACOM_EXPORT DynaCoM {
   CentroidalWrench ground_wrench_;
   Vector6 ext_wrench_;
   CentroidalState feasible_;  // the state with the accelerations that contacts can cause
-  bool distributed_by_dynamics_ = false;  // whether p and v are those of feasible_
+  CentroidalState pressing_;  // the motion that the CoP is of, and the VRP: one or the other
   Eigen::Vector2d cop_, vrp_, nl_;
 
   std::vector<Entry> contacts_;  // the active ones first

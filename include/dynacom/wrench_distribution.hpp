@@ -11,7 +11,8 @@
 
 namespace dynacom {
 
-/// How a distribution ended. Whatever it says, the forces lie within all inequalities.
+/// How a distribution ended. Whatever it says, the forces lie within all inequalities, but for
+/// rounding of 1e-9 of the scale.
 enum class DistributionStatus {
   /// The wrench can be reached: its distance to what the contacts can give is at most 1e-8 of the
   /// scale. The forces give it, and are the cheapest that do.
@@ -19,7 +20,8 @@ enum class DistributionStatus {
   /// The wrench is out of reach. The forces give the closest one that the contacts can give, and
   /// are the cheapest that do.
   Relaxed,
-  /// There is no contact, and the wrench is not zero (1e-8 of the scale is).
+  /// There is no contact, and the wrench is not zero (1e-8 of the scale is). Also before the first
+  /// solve().
   NoContact,
   /// A number that came in was not finite. The forces are those of the last Solved or Relaxed, if
   /// contacts and settings are still the same, else zero.
@@ -36,7 +38,8 @@ DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, DistributionStatus st
 /// What a distribution was asked, and what it answered.
 ///
 /// Wrenches w are (force [N], moment [N·m]) about the CoM in the world's axes; their size is the
-/// norm ‖D w‖ with D = diag(wrench_weights). Before the first solve() numbers are NaN.
+/// norm ‖D w‖ with D = diag(wrench_weights). Before the first solve() numbers are NaN. Where there
+/// is no answer, multipliers are zero, and `achieved` and `cost` are those of the forces that stay.
 struct DYNACOM_EXPORT DistributionResult {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
 
@@ -46,14 +49,15 @@ struct DYNACOM_EXPORT DistributionResult {
     Eigen::VectorXd weights;  ///< wᵢ of the cost ½ Σ (wᵢ λᵢ)², n
     Eigen::Matrix<double, 6, Eigen::Dynamic> NE;  ///< takes λ to the wrench about the CoM, 6 × n
     Eigen::VectorXd force;                        ///< λ, in the surface's frame, n
-    /// Which inequalities hold as equations in the answer, m.
+    /// Which inequalities the answer was found with as equations, m. Others may be equations, too,
+    /// where more meet than are needed.
     Eigen::Array<bool, Eigen::Dynamic, 1> active;
     /// Multipliers μ of the inequalities in the minimum of the cost, m: zero where one is not
     /// active; ≥ 0, but for those that the relaxation multiplies, which are equations there.
     Eigen::VectorXd multipliers;
     /// Multipliers μ' ≥ 0 of the inequalities in the relaxation, m: where one is positive, all
     /// forces that come as close to the wrench lie on that inequality's bound. Zero where no
-    /// relaxation was needed.
+    /// relaxation was needed. Below 1e-10 of the distance, or 1e-14 of the scale, it is rounding.
     Eigen::VectorXd relaxation_multipliers;
   };
 
@@ -64,7 +68,7 @@ struct DYNACOM_EXPORT DistributionResult {
   Vector6 achieved = Vector6::Constant(kNaN);  ///< what the forces give, Σ NE λ
   Vector6 residual = Vector6::Constant(kNaN);  ///< wrench − achieved
   Vector6 wrench_weights = Vector6::Ones();    ///< D
-  double scale = kNaN;                         ///< what tolerances are relative to [N]
+  double scale = kNaN;                         ///< of ‖D w‖, what tolerances are relative to
   double cost = kNaN;                          ///< ½ Σ (wᵢ λᵢ)²
   int iterations = 0;                          ///< of the active-set method, in both stages
   std::vector<Contact> contacts;               ///< in the order of WrenchDistribution::add()
@@ -117,7 +121,9 @@ class DYNACOM_EXPORT WrenchDistribution {
   ~WrenchDistribution();
 
   /// Weights D of the norm in which the closest wrench is the closest: three of the force, three of
-  /// the moment [1/m]. All 1 by default: 1 for forces, 1/ℓ for moments with ℓ = 1 m.
+  /// the moment [1/m]. All 1 by default: 1 for forces, 1/ℓ for moments with ℓ = 1 m. Their common
+  /// factor means nothing; apart by more than about 1e4, some wrenches out of reach end as
+  /// DistributionStatus::NumericalFailure, and computeMargin() may be wrong.
   /// @throws std::invalid_argument unless all are finite and > 0
   void setWrenchWeights(const Vector6& weights);
   const Vector6& getWrenchWeights() const;
@@ -127,8 +133,8 @@ class DYNACOM_EXPORT WrenchDistribution {
   void clear();
 
   /// Adds a contact, with the matrices that it has now.
-  /// @throws std::invalid_argument if the contact was never initialised, or its uni_b() or fri_b()
-  ///         is not zero
+  /// @throws std::invalid_argument if the contact was never initialised; NotReadyError if it was
+  ///         never placed by updateNewtonEuler()
   void add(const ContactBase& contact);
 
   /// Adds a contact by its matrices.
@@ -143,9 +149,10 @@ class DYNACOM_EXPORT WrenchDistribution {
 
   /// Solves for the forces that give a wrench, or the closest to it.
   /// @param wrench        (force [N], moment [N·m]) about the CoM, world axes
-  /// @param minimalScale  the scale, which tolerances are relative to, is ‖D w‖, but at least this
-  ///                      [N]: the robot's weight, say, so that a free fall, where the wrench is
-  ///                      all rounding, is one
+  /// @param minimalScale  the scale, which tolerances are relative to, is ‖D w‖, but at least that
+  ///                      of a force of this size, ≥ 0 [N]: the robot's weight, say, so that a free
+  ///                      fall, where the wrench is all rounding, is one
+  /// @throws std::invalid_argument if minimalScale is negative
   DistributionStatus solve(const Vector6& wrench, double minimalScale = 0.);
 
   /// The last solve()'s answer.

@@ -26,7 +26,7 @@ mean the same. The files in the package's folder ``robots`` are known by their n
 
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -83,8 +83,8 @@ class Robot:
     """A model and the settings of its contacts."""
 
     name: str
-    #: With the contacts' own frames; its root joint is a free-flyer.
-    model: pin.Model
+    #: With the contacts' own frames; its root joint is a free-flyer. Prints a line per joint.
+    model: pin.Model = field(repr=False)
     #: Contact's name -> its settings, in the order of the file.
     contacts: Mapping[str, ContactSettings]
 

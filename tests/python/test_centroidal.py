@@ -375,7 +375,7 @@ def test_wrong_sizes(humanoid, name, change):
         dynacom.computeCentroidalState(humanoid, humanoid.createData(), **arguments)
 
 
-@pytest.mark.parametrize("wrong", [None, "q", [0.0], np.zeros((2, 3)), np.array(["a"]), 1.0])
+@pytest.mark.parametrize("wrong", [None, "q", [[0.0]], np.zeros((2, 3)), np.array(["a"]), 1.0])
 def test_wrong_types(humanoid, wrong):
     zero = np.zeros(humanoid.nv)
     data = humanoid.createData()

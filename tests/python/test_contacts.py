@@ -748,7 +748,7 @@ def test_settings_of_the_wrong_size(settings, size):
 
 
 @pytest.mark.parametrize(
-    "wrong", [None, "abc", [1, 2, 3], 1.0, np.array(list("abc")), np.ones(3) * 1j, {}]
+    "wrong", [None, "abc", [1, 2, "3"], 1.0, np.array(list("abc")), np.ones(3) * 1j, {}]
 )
 def test_vectors_of_the_wrong_type(the_point, wrong):
     before = state(the_point)
@@ -786,3 +786,43 @@ def test_numbers_of_numpy(kind):
     assert settings.world_aligned is True
     with pytest.raises(TypeError):
         settings.mu = np.ones(1)
+
+
+NO_NUMBERS = [
+    np.timedelta64(3),
+    np.timedelta64(3, "s"),
+    np.datetime64(3, "s"),
+    np.complex64(1),
+    np.complex128(1 + 2j),
+    np.str_("3"),
+    np.bytes_(b"3"),
+    np.array(3.0),
+]
+
+
+@pytest.mark.parametrize("wrong", NO_NUMBERS, ids=repr)
+def test_what_numpy_has_besides_numbers(wrong):
+    """Is refused, although Python's float() takes most of it."""
+    settings = point_settings(mu=0.5, world_aligned=True)
+    contact = ContactPoint(settings)
+    contact.setFrameID(7)
+    for field in ("mu", "radius", "world_aligned"):
+        with pytest.raises(TypeError):
+            setattr(settings, field, wrong)
+    for call in (contact.setMu, contact.setFrameID):
+        with pytest.raises(TypeError):
+            call(wrong)
+    assert contact.getSettings() == settings == point_settings(mu=0.5, world_aligned=True)
+    assert contact.getFrameID() == 7
+
+
+def test_booleans_and_fractions_of_numpy_stay_what_they_are():
+    settings, contact = point_settings(), point()
+    for value in (np.int64(1), np.float64(1.0)):
+        with pytest.raises(TypeError):
+            settings.world_aligned = value
+    for value in (np.bool_(True), np.float64(1.0)):
+        with pytest.raises(TypeError):
+            contact.setFrameID(value)
+    with pytest.raises(TypeError):
+        settings.mu = np.bool_(True)

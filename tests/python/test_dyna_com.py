@@ -748,7 +748,7 @@ def test_distribution_of_vectors_of_the_wrong_size(robot, name):
 
 
 @pytest.mark.parametrize(
-    "wrong", [None, "q", 3.0, [0.0, 1.0], np.zeros((2, 2)), np.array(["a"]), np.ones(3) * 1j, {}]
+    "wrong", [None, "q", 3.0, [0.0, "1.0"], np.zeros((2, 2)), np.array(["a"]), np.ones(3) * 1j, {}]
 )
 def test_vectors_of_the_wrong_type(robot, wrong):
     """An error, after which the robot is as it was and works."""

@@ -12,6 +12,13 @@ ROOT = Path(__file__).resolve().parents[2]
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", (ROOT / "README.md").read_text(), re.M | re.S)
 
 
+# Commands that a test cannot wait for, and what their usage must say.
+TAKE_LONG = {
+    "scripts/test --sanitize": "ThreadSanitizer",
+    "scripts/reliability": "1,000,000 of all sorts, each answer certified",
+}
+
+
 def blocks(language):
     return [text for kind, text in BLOCKS if kind == language]
 
@@ -51,6 +58,15 @@ def test_command(command, tmp_path):
         # This runs in it; so does CI.
         assert "scripts/test" in (ROOT / ".ci/run").read_text()
         return
+    if command in TAKE_LONG:
+        # What README says of them stands in what they say of themselves.
+        script, *options = command.split()
+        usage = subprocess.run([ROOT / script, "-h"], capture_output=True, text=True, check=True)
+        first, *rest = usage.stdout.splitlines()
+        assert first.startswith(f"Usage: {script}")
+        assert all(f"[{option}]" in first for option in options)
+        assert TAKE_LONG[command] in " ".join(rest)
+        return
     # What is written goes to a folder of the test's, so paths of the project become absolute.
     absolute = re.sub(r"(?<![\w/.])(\.venv|scripts|examples)/", rf"{ROOT}/\1/", command)
     environment = dict(os.environ, PATH=f"{ROOT}/.venv/bin:{os.environ['PATH']}")
@@ -65,8 +81,21 @@ def test_command(command, tmp_path):
             assert set(row) == {"name", "reference", "median_ns", "ratio"}
             assert row["median_ns"] > 0 and row["ratio"] > 0
             assert all(text in done.stdout for text in (row["name"], row["reference"]))
+    if "anymal_trot" in command:
+        assert re.search(r"Solved +│ 74 ", done.stdout) and re.search(
+            r"Relaxed +│ 120 ", done.stdout
+        )
     if command == "scripts/demo":
         assert "demo_output/frames.csv" in done.stdout.splitlines()[-1]
+
+
+def test_every_motion_and_script_is_shown():
+    shown = " ".join(commands())
+    for motion in (ROOT / "examples/data").glob("*.npz"):
+        assert f"examples/data/{motion.name}" in shown
+    # Setup is what the others begin with.
+    for script in {path.name for path in (ROOT / "scripts").iterdir()} - {"setup"}:
+        assert f"scripts/{script}" in shown
 
 
 def test_links():

@@ -309,6 +309,32 @@ def test_two_points_give_all_but_one_component(trot, contacts):
         assert 1e-6 < min(distances) < max(distances) < 2e-3
 
 
+def test_what_is_written_about_the_trot(root, trot):
+    """The numbers in docs/files.md."""
+    robot, model = trot.yaml.dynacom(), trot.yaml.model
+    arrays, data = trot.arrays, model.createData()
+    motion = Motion(*(arrays[key] for key in "tqva"))
+    analysis = dynacom.analyzeMotion(robot, motion, ContactSchedule(trot.names, arrays["contacts"]))
+    force, moment = np.split(analysis.residual, 2, axis=1)
+    away = 0.0
+    for q, active in zip(arrays["q"], arrays["contacts"], strict=True):
+        robot.computeDynamics(q, np.zeros(model.nv), np.zeros(model.nv))
+        pin.framesForwardKinematics(model, data, q)
+        for k in np.flatnonzero(active):
+            planned = data.oMf[model.getFrameId(trot.frames[k])].translation
+            own = robot.getContact(trot.names[k]).getSurfacePose().translation
+            away = max(away, np.linalg.norm(own - planned))
+    text = " ".join((root / "docs/files.md").read_text().split())
+    for number in (
+        f"up to {1e3 * away:.0f} mm away",
+        f"{analysis.status.count(RELAXED)} of {len(trot)} frames on two feet are `Relaxed`",
+        f"by up to {np.linalg.norm(force, axis=1).max():.2f} N",
+        f"{np.linalg.norm(moment, axis=1).max():.2f} N·m",
+        f"the other {analysis.status.count(SOLVED)}, on four, `Solved`",
+    ):
+        assert number in text
+
+
 @pytest.mark.parametrize("flat", [True, False])
 def test_analysis_of_the_robot_that_comes_with_the_package(walk, flat):
     """All the way: robot file, motion, schedule, every frame."""

@@ -947,7 +947,7 @@ def test_wrench_weights_out_of_their_range(wrong):
     for size in (0, 3, 5, 7):
         with pytest.raises(ValueError, match=f"weights must have 6 components, got {size}"):
             distribution.setWrenchWeights(weights=np.ones(size))
-    for kind in (None, 1.0, "ones", [1.0] * 6):
+    for kind in (None, 1.0, "ones", ["1.0"] * 6):
         with pytest.raises(TypeError):
             distribution.setWrenchWeights(kind)
     assert_array_equal(distribution.getWrenchWeights(), weights)
@@ -1040,7 +1040,7 @@ def test_wrenches_of_the_wrong_size(size):
 
 def test_wrong_types():
     distribution = WrenchDistribution()
-    for wrong in (None, "wrench", [1.0] * 6, np.ones((2, 3)), np.array(list("abcdef"))):
+    for wrong in (None, "wrench", [1.0, None], np.ones((2, 3)), np.array(list("abcdef"))):
         with pytest.raises(TypeError):
             distribution.solve(wrong)
         with pytest.raises(TypeError):

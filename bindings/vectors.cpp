@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "bindings.hpp"
+
+namespace dynacom::python {
+
+namespace {
+
+std::string typeName(const bp::object& object) { return Py_TYPE(object.ptr())->tp_name; }
+
+[[noreturn]] void refuse(const char* name, int size, const std::string& got) {
+  const std::string message = internal::concat(name, " must be an array, a list or a tuple of ",
+                                               size, " numbers, got ", got);
+  PyErr_SetString(PyExc_TypeError, message.c_str());
+  throw bp::error_already_set();
+}
+
+std::string describeRefused(const bp::object& values) {
+  if (!PyObject_HasAttrString(values.ptr(), "dtype")) return typeName(values);
+  const bp::object shape = values.attr("shape"), type = values.attr("dtype");
+  const bp::object description = bp::str("{}, shape {}, type {}").attr("format");
+  return bp::extract<std::string>(description(typeName(values), shape, type));
+}
+
+}  // namespace
+
+Eigen::VectorXd toNumbers(const char* name, const bp::object& values, int size) {
+  const bp::extract<Eigen::VectorXd> array(values);
+  if (array.check()) return array();
+  if (!PyList_Check(values.ptr()) && !PyTuple_Check(values.ptr()))
+    refuse(name, size, describeRefused(values));
+  Eigen::VectorXd numbers(bp::len(values));
+  for (Eigen::Index k = 0; k < numbers.size(); ++k) {
+    const bp::object value = values[k];
+    const bp::extract<double> number(value);
+    if (!number.check())
+      refuse(name, size,
+             internal::concat(typeName(value), " as number ", k, " of a ", typeName(values)));
+    numbers[k] = number();
+  }
+  return numbers;
+}
+
+std::string toText(const Eigen::VectorXd& values) {
+  const Eigen::IOFormat row(Eigen::StreamPrecision, Eigen::DontAlignCols, " ", " ", "", "", "[",
+                            "]");
+  return internal::concat(values.transpose().format(row));
+}
+
+std::string toText(const std::vector<std::string>& names) {
+  std::string text = "[";
+  for (const std::string& name : names) text += (text.size() > 1 ? ", '" : "'") + name + "'";
+  return text + "]";
+}
+
+}  // namespace dynacom::python
