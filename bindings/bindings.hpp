@@ -96,25 +96,32 @@ struct CopyVisitor : bp::def_visitor<CopyVisitor<Class>> {
   static Class deepcopy(const Class& self, const bp::dict&) { return self; }
 };
 
+/// Sets an attribute that there is. Python would make a new one of a misspelt name, and say
+/// nothing.
+void setKnownAttribute(const bp::object& self, const bp::str& name, const bp::object& value);
+
 /// "[1 2 3]", as in the printing of settings.
 std::string toText(const Eigen::VectorXd& values);
 /// "['left', 'right']"
 std::string toText(const std::vector<std::string>& names);
 
-/// Gives a class its printing, by a function that writes "Class(field=value, ...)".
+/// Gives a class its printing, by a function that writes "Class(field=value, ...)", and lets nobody
+/// give it new attributes.
 template <class Class>
 struct PrintVisitor : bp::def_visitor<PrintVisitor<Class>> {
   explicit PrintVisitor(std::string (*write)(const Class&)) : write_(write) {}
   template <class PyClass>
   void visit(PyClass& cls) const {
-    cls.def("__str__", write_, bp::arg("self")).def("__repr__", write_, bp::arg("self"));
+    cls.def("__str__", write_, bp::arg("self"))
+        .def("__repr__", write_, bp::arg("self"))
+        .def("__setattr__", &setKnownAttribute);
   }
 
  private:
   std::string (*write_)(const Class&);
 };
 
-/// Gives a settings struct its printing, comparing and copying.
+/// Gives a settings struct its printing, comparing and copying, and lets nobody give it new fields.
 template <class Settings>
 struct SettingsVisitor : bp::def_visitor<SettingsVisitor<Settings>> {
   template <class PyClass>
@@ -126,6 +133,7 @@ struct SettingsVisitor : bp::def_visitor<SettingsVisitor<Settings>> {
         .def("to_string", &Settings::to_string, bp::arg("self"), "Names and values of the fields.")
         .def("__str__", &Settings::to_string, bp::arg("self"))
         .def("__repr__", &Settings::to_string, bp::arg("self"))
+        .def("__setattr__", &setKnownAttribute)
         .def(CopyVisitor<Settings>());
   }
 };

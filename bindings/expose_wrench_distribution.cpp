@@ -97,12 +97,10 @@ void exposeWrenchDistribution() {
         bp::class_<DistributionResult>(
             "DistributionResult",
             "What a distribution was asked, and what it answered.\n\n"
-            "Wrenches are (6,): force [N] and moment [N·m] about the "
-            "centre of mass, world axes;\n"
-            "their size is the norm of wrench_weights * wrench. Where there is no answer, "
-            "multipliers are\n"
-            "zero, and achieved and cost are those of the forces that stay. Before "
-            "the first solve() numbers are NaN.",
+            "Wrenches are (6,): force [N] and moment [N·m] about the centre of mass, world axes;\n"
+            "their size is the norm of wrench_weights * wrench. Before the first solve() numbers\n"
+            "are NaN. Where there is no answer, multipliers are zero, and achieved and cost are\n"
+            "those of the forces that stay.",
             bp::no_init)
             .def_readonly("status", &DistributionResult::status, "DistributionStatus.")
             .add_property("wrench", getter(&DistributionResult::wrench),

@@ -52,4 +52,14 @@ std::string toText(const std::vector<std::string>& names) {
   return text + "]";
 }
 
+void setKnownAttribute(const bp::object& self, const bp::str& name, const bp::object& value) {
+  if (!PyObject_HasAttr(bp::object(self.attr("__class__")).ptr(), name.ptr())) {
+    PyErr_Format(PyExc_AttributeError, "'%s' has no attribute '%U'", Py_TYPE(self.ptr())->tp_name,
+                 name.ptr());
+    bp::throw_error_already_set();
+  }
+  if (PyObject_GenericSetAttr(self.ptr(), name.ptr(), value.ptr()) != 0)
+    bp::throw_error_already_set();
+}
+
 }  // namespace dynacom::python

@@ -45,8 +45,9 @@ struct Tolerances {
   static constexpr int kStalledSteps = 2;
   static constexpr Scalar kRounding = 1e-15 * kRoundoff<Scalar>;
   static constexpr Scalar kParallel = 1e-9 * kRoundoff<Scalar>;
-  // A distance that has few digits, where the wrench weights are equal.
+  // A distance that has few digits, where the wrench weights are equal, and forces that do.
   static constexpr Scalar kNearBoundary = 1e-5;
+  static constexpr Scalar kLargeForces = 100.;
   // Of the cheapest forces on a face: √ε, how many steps, and when nothing is missing any more.
   static constexpr Scalar kSlack = 1e-4 * kRoundoffRoot<Scalar>;
   static constexpr int kMultiplierSteps = 100;
@@ -381,9 +382,10 @@ DistributionStatus TwoStageSolver<Scalar>::solve(const Vector6& wrench) {
 }
 
 template <class Scalar>
-bool TwoStageSolver<Scalar>::isNearBoundary() const {
+bool TwoStageSolver<Scalar>::hasFewDigits() const {
   const Scalar spread = weights_.maxCoeff() / weights_.minCoeff();
-  return on_face_ && distance_.norm() < Tolerances<Scalar>::kNearBoundary * spread;
+  return on_face_ && (distance_.norm() < Tolerances<Scalar>::kNearBoundary * spread ||
+                      lambda_.norm() > Tolerances<Scalar>::kLargeForces);
 }
 
 template <class Scalar>

@@ -52,9 +52,9 @@ class TwoStageSolver {
   /// @param overall_weight  the wrench weights over those of setProblem()
   void writeAnswer(DistributionResult& result, double unit, double overall_weight);
 
-  /// Whether the answer of solve() is that of a wrench next to the boundary of what is reachable,
-  /// where the multipliers of the first stage have few digits.
-  bool isNearBoundary() const;
+  /// Whether the answer of solve() may have lost digits: the wrench is next to the boundary of what
+  /// is reachable, but not on it, or forces cancel out that are much larger than the wrench.
+  bool hasFewDigits() const;
 
   /// How often the active set has changed in the last solve().
   int iterations() const { return iterations_; }

@@ -278,7 +278,7 @@ void WrenchDistribution::Workspace::takeProblem() {
 // Returns false if there is no answer.
 bool WrenchDistribution::Workspace::distribute() {
   const bool answered = distributeBy(solver);
-  if (answered && !solver.isNearBoundary() && result.isOptimal(kProof)) return true;
+  if (answered && !solver.hasFewDigits() && result.isOptimal(kProof)) return true;
   const DistributionStatus status = result.status;
   if (distributeBy(accurate_solver)) return true;
   result.status = status;

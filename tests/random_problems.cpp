@@ -190,7 +190,8 @@ Problem ProblemGenerator::next() {
   for (ProblemContact& contact : problem.contacts) contact.weights *= weight;
   problem.wrench_weights.setOnes();
   if (oneIn(4)) {
-    const double decades = oneIn(2) ? 2. : 1.;
+    problem.weights_far_apart = oneIn(2);
+    const double decades = problem.weights_far_apart ? 2. : 1.;
     for (double& wrench_weight : problem.wrench_weights)
       wrench_weight = powerOfTen(-decades, decades);
   }

@@ -32,7 +32,8 @@ struct ProblemContact {
 
 struct Problem {
   Place place;
-  bool nearly_parallel = false;  ///< contacts of one orientation, but for 1e-14 to 1e-2 rad
+  bool nearly_parallel = false;    ///< contacts of one orientation, but for 1e-14 to 1e-2 rad
+  bool weights_far_apart = false;  ///< wrench weights up to 1e4 apart, rather than 1e2
   std::vector<ProblemContact> contacts;
   Vector6 wrench;
   Vector6 wrench_weights;

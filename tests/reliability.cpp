@@ -42,9 +42,9 @@ struct Tally {
 
 }  // namespace
 
-// usage: reliability [PROBLEMS [SEED]]. Fails if an answer is not certified; with nearly parallel
-// contacts, where costs may depend on digits that doubles do not have, if there is no answer, or
-// more than 1 in 1,000 are not.
+// usage: reliability [PROBLEMS [SEED]]. Fails if an answer is not certified; where contacts are
+// nearly parallel or wrench weights far apart, so that costs may depend on digits that doubles do
+// not have, if there is no answer, or more than 1 in 1,000 are not.
 int main(int argc, char** argv) {
   const long problems = argc > 1 ? std::atol(argv[1]) : 1000;
   const long seed = argc > 2 ? std::atol(argv[2]) : 1;
@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
   }
   ProblemGenerator generator(static_cast<unsigned long>(seed));
   std::array<Tally, kPlaceNames.size()> tallies;
-  Tally all, nearly_parallel;
+  Tally all, nearly_parallel, weights_far_apart;
   for (long i = 0; i < problems; ++i) {
     const Problem problem = generator.next();
     dynacom::WrenchDistribution distribution;
@@ -67,17 +67,21 @@ int main(int argc, char** argv) {
     const auto place = static_cast<std::size_t>(problem.place);
     if (problem.nearly_parallel) {
       nearly_parallel.add(distribution.result(), verdict);
+    } else if (problem.weights_far_apart) {
+      weights_far_apart.add(distribution.result(), verdict);
     } else {
       tallies[place].add(distribution.result(), verdict);
       all.add(distribution.result(), verdict);
     }
     if (!verdict.error.empty())
-      std::fprintf(stderr,
-                   "problem %ld (%s, %zu%s contacts): %s; outside %.1e, residual %.1e (gap %.1e), "
-                   "cost gap %.1e\n",
-                   i, kPlaceNames[place], problem.contacts.size(),
-                   problem.nearly_parallel ? " nearly parallel" : "", verdict.error.c_str(),
-                   verdict.outside_cone, verdict.residual, verdict.residual_gap, verdict.cost_gap);
+      std::fprintf(
+          stderr,
+          "problem %ld (%s, %zu%s contacts%s): %s; outside %.1e, residual %.1e (gap %.1e), "
+          "cost gap %.1e\n",
+          i, kPlaceNames[place], problem.contacts.size(),
+          problem.nearly_parallel ? " nearly parallel" : "",
+          problem.weights_far_apart ? ", weights far apart" : "", verdict.error.c_str(),
+          verdict.outside_cone, verdict.residual, verdict.residual_gap, verdict.cost_gap);
   }
   std::printf(
       "| wrench | problems | Solved | Relaxed | failures | wrong | not optimal | "
@@ -87,6 +91,9 @@ int main(int argc, char** argv) {
   for (std::size_t i = 0; i < tallies.size(); ++i) tallies[i].print(kPlaceNames[i]);
   all.print("all of these");
   nearly_parallel.print("nearly parallel contacts");
-  return all.wrong + nearly_parallel.failures > 0 ||
-         1000 * nearly_parallel.wrong > nearly_parallel.problems;
+  weights_far_apart.print("wrench weights far apart");
+  bool failed = all.wrong > 0;
+  for (const Tally& hard : {nearly_parallel, weights_far_apart})
+    failed = failed || hard.failures > 0 || 1000 * hard.wrong > hard.problems;
+  return failed;
 }

@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <eiquadprog/eiquadprog-fast.hpp>
 #include <functional>
 #include <limits>
 #include <sstream>
@@ -842,6 +843,37 @@ BOOST_AUTO_TEST_CASE(contacts_of_other_kinds_are_forces_or_wrenches) {
     BOOST_TEST(distribution.solve(wrench(-30., 0., 500.)) == DistributionStatus::Solved);
     BOOST_TEST(close(distribution.result().forces().head<3>(), Vector3d(-30., 0., 500.)));
   }
+}
+
+BOOST_AUTO_TEST_CASE(eiquadprog_finds_the_same_forces) {
+  // It needs independent equalities, which soles give, and a wrench within reach.
+  Random random(77);
+  WrenchDistribution distribution;
+  int tightened = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    Contacts contacts;
+    for (Index count = random.integer(1, 4); count > 0; --count)
+      contacts.push_back(
+          makeSole(soleSettings(0.7, random.vector(6, 0.5, 2.)), random.placement()));
+    const Problem problem = stackedProblem(contacts);
+    VectorXd given(problem.q.size());
+    for (std::size_t k = 0; k < contacts.size(); ++k)
+      given.segment<6>(6 * static_cast<Index>(k)) =
+          randomForce(random, *contacts[k], random.coin() ? 1. : 0.5);
+    const Vector6 total = problem.ne * given;
+    BOOST_REQUIRE(solve(distribution, contacts, total) == DistributionStatus::Solved);
+
+    eiquadprog::solvers::EiquadprogFast solver;
+    solver.reset(given.size(), 6, problem.inequalities.rows());
+    VectorXd forces(given.size());
+    const auto status = solver.solve_quadprog(problem.q.asDiagonal(), VectorXd::Zero(given.size()),
+                                              problem.ne, -total, -problem.inequalities,
+                                              VectorXd::Zero(problem.inequalities.rows()), forces);
+    BOOST_REQUIRE((status == eiquadprog::solvers::EIQUADPROG_FAST_OPTIMAL));
+    BOOST_TEST(close(distribution.result().forces(), forces, 1e-7));
+    tightened += solver.getActiveSetSize() > 6;
+  }
+  BOOST_TEST(tightened > 100);
 }
 
 /// A force at a corner of a contact's cone.

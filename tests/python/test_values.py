@@ -73,6 +73,17 @@ def test_all_classes_are_looked_at(objects):
     assert classes - ABSTRACT <= set(objects)
 
 
+def test_misspelt_attributes_are_refused(objects):
+    for name, value in objects.items():
+        with pytest.raises(AttributeError):
+            value.half_lenght = 0.1
+        assert not hasattr(value, "half_lenght"), name
+    with pytest.raises(AttributeError, match="'Contact6DSettings' has no attribute 'halfLength'"):
+        sole_settings().halfLength = 0.1
+    with pytest.raises(AttributeError, match="mu"):
+        sole().mu = 0.1
+
+
 def test_nothing_prints_an_address(objects):
     for name, value in objects.items():
         for text in (str(value), repr(value)):
