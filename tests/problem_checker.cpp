@@ -156,7 +156,11 @@ Verdict check(const Problem& problem, const dynacom::DistributionResult& result)
   // wrench is on the boundary, ν may be moved along y, which all such forces are orthogonal
   // to; that is more accurate by the relaxation's multipliers than by what is left of the wrench.
   const R6 nu = result.wrench_multipliers.cast<Real>();
-  const R6 normal_to_face = findNormal(problem, result);
+  R6 normal_to_face = findNormal(problem, result);
+  // Orthogonal to what is achieved, but for rounding, which a large multiple would not be.
+  const R6 pulled = weights.cwiseAbs2().cwiseProduct(achieved);
+  if (pulled.dot(achieved) > 0.)
+    normal_to_face -= normal_to_face.dot(achieved) / pulled.dot(achieved) * pulled;
   const Real nu_norm = nu.cwiseQuotient(weights).norm();
   const Real normal_norm = normal_to_face.cwiseQuotient(weights).norm();
   // Forces are as good as their digits: 1e-9 of the scale is nothing.

@@ -297,6 +297,9 @@ BOOST_AUTO_TEST_CASE(kinds_without_a_limit_use_none_of_it) {
 BOOST_AUTO_TEST_CASE(without_force_nothing_is_used) {
   const auto tip = point();
   const auto foot = sole();
+  tip->setMu(0.5);
+  foot->setMu(0.5);
+  foot->setGu(0.5);
   BOOST_TEST(tip->getFrictionUsage() == 0.);
   BOOST_TEST(foot->getFrictionUsage() == 0.);
   BOOST_TEST(foot->getYawUsage() == 0.);
