@@ -7,12 +7,14 @@
 #include <utility>
 
 #include "check.hpp"
+#include "dual_newton.hpp"
 #include "two_stage.hpp"
 
 namespace dynacom {
 
 namespace {
 
+using internal::DualNewton;
 using internal::kLeastMultiplier;
 using internal::kMultiplied;
 using internal::kReach;
@@ -174,7 +176,8 @@ struct WrenchDistribution::Workspace {
   double unit = 0., overall_weight = 1.;
   Vector6 wrench_weights = Vector6::Ones();
 
-  TwoStageSolver<double> solver;
+  DualNewton newton;                            // for nearly all problems
+  TwoStageSolver<double> solver;                // what that leaves
   TwoStageSolver<long double> accurate_solver;  // several times slower
 
   Contact& nextContact();
@@ -270,13 +273,22 @@ void WrenchDistribution::Workspace::takeProblem() {
   }
   if (same) return;
   has_answer = false;
-  accurate_solver.setProblem(result.contacts, wrench_weights);  // gets its storage
+  newton.setContacts(result.contacts);
+  solver.setProblem(result.contacts, wrench_weights);  // for their storage
+  accurate_solver.setProblem(result.contacts, wrench_weights);
 }
 
 // Few problems need more digits than double has: those where contacts are nearly parallel, and
 // where the wrench is so close to the boundary that it is barely known which side it is on.
 // Returns false if there is no answer.
 bool WrenchDistribution::Workspace::distribute() {
+  result.status = newton.solve(result.contacts, result.wrench / unit, wrench_weights);
+  result.iterations = newton.iterations();
+  if (result.status != DistributionStatus::NumericalFailure) {
+    newton.writeAnswer(result, unit, overall_weight);
+    sumUp();
+    return true;
+  }
   const bool answered = distributeBy(solver);
   if (answered && !solver.hasFewDigits() && result.isOptimal(kProof)) return true;
   const DistributionStatus status = result.status;
