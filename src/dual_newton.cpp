@@ -14,13 +14,16 @@ constexpr int kNormal = BoxCone::kNormal;
 
 // All of these are for a problem whose weighted wrench has unit size.
 
-// ε, as a part of the mean compliance.
-constexpr double kSlack = 1e-10;
+// ε, as a part of the mean compliance: less, if the answer that it leads to is none.
+constexpr double kSlacks[] = {1e-5, 1e-8, 1e-11};
 constexpr int kMaximalSteps = 50;
-// A step has gone too far where the dual has begun to fall again by more than this part of its
-// slope at the start; how often it is shortened.
-constexpr double kOvershoot = 0.1;
-constexpr int kMaximalCuts = 10;
+// Along a step, what part of the slope at its start is as good as none; how often it is cut, and
+// how often until it is enough to have come to another state; and when two lengths are not compared
+// by their difference.
+constexpr double kFlat = 0.3;
+constexpr int kMaximalCuts = 30;
+constexpr int kEasyCuts = 3;
+constexpr double kFarApart = 4.;
 // What part of the largest compliance the least must be, so that nothing needs to be asked about
 // the rank.
 constexpr double kFullRank = 1e-6;
@@ -28,12 +31,14 @@ constexpr double kFullRank = 1e-6;
 // than the first, it is one of its own, less than the second, it is rounding.
 constexpr double kIndependent = 1e-6;
 constexpr double kDependent = 1e-11;
-// The distance from the closest wrench: more than the first, it has digits enough, less than the
-// second, it is rounding.
-constexpr double kFar = 1e-5;
+// The distance from the closest wrench: more than the first, times how far wrench weights are
+// apart, it has digits enough, less than the second, it is rounding.
+constexpr double kFar = 1e-4;
 constexpr double kReached = 1e-13;
-// What an answer may lack.
+// What an answer may lack, and until when it is refined out of reach, where what is missing is to
+// be accurate, too.
 constexpr double kMissing = 1e-12;
+constexpr double kExact = 4e-16;
 constexpr int kRefinements = 3;
 // By how much the signs of an answer may be wrong, beside the terms that make them up.
 constexpr double kRounding = 1e-12;
@@ -114,9 +119,9 @@ void DualNewton::setContacts(const std::vector<Contact>& contacts) {
 // Begins with all components free, but for those that are always zero.
 void DualNewton::release() {
   for (Block& block : blocks_) {
-    block.loaded = true;
+    block.state.loaded = true;
     for (int i = 0; i < block.cone.size; ++i)
-      block.bounds[i] = i != kNormal && block.betas[i] == 0. ? 1 : 0;
+      block.state.bounds[i] = i != kNormal && block.betas[i] == 0. ? 1 : 0;
   }
 }
 
@@ -135,28 +140,29 @@ void DualNewton::project(Block& block) {
     inside = inside &&
              (i == kNormal || std::abs(g[i]) * block.compliances[i] <= block.betas[i] * normal);
   if (inside) {
-    block.loaded = true;
-    for (int i = 0; i < size; ++i) block.bounds[i] = block.betas[i] == 0. && i != kNormal ? 1 : 0;
+    block.state.loaded = true;
+    for (int i = 0; i < size; ++i)
+      block.state.bounds[i] = block.betas[i] == 0. && i != kNormal ? 1 : 0;
     return;
   }
 
   double numerator = g[kNormal], denominator = block.costs[kNormal];
   for (int i = 0; i < size; ++i) {
-    block.bounds[i] = 0;
+    block.state.bounds[i] = 0;
     if (i == kNormal) continue;
-    block.bounds[i] = g[i] < 0. ? -1 : 1;
+    block.state.bounds[i] = g[i] < 0. && block.betas[i] > 0. ? -1 : 1;
     numerator += block.betas[i] * std::abs(g[i]);
     denominator += block.betas[i] * block.betas[i] * block.costs[i];
   }
-  block.loaded = numerator > 0.;
-  if (!block.loaded) return;
+  block.state.loaded = numerator > 0.;
+  if (!block.state.loaded) return;
   for (bool changed = true; changed;) {
     normal = numerator / denominator;
     changed = false;
     for (int i = 0; i < size; ++i) {
-      if (i == kNormal || block.bounds[i] == 0 || block.betas[i] == 0.) continue;
+      if (i == kNormal || block.state.bounds[i] == 0 || block.betas[i] == 0.) continue;
       if (std::abs(g[i]) > block.costs[i] * block.betas[i] * normal) continue;
-      block.bounds[i] = 0;
+      block.state.bounds[i] = 0;
       numerator -= block.betas[i] * std::abs(g[i]);
       denominator -= block.betas[i] * block.betas[i] * block.costs[i];
       changed = true;
@@ -167,14 +173,14 @@ void DualNewton::project(Block& block) {
 // The forces for the pull at hand, components at their bounds staying there.
 void DualNewton::respond(Block& block) {
   block.force.setZero();
-  if (!block.loaded) return;
+  if (!block.state.loaded) return;
   double numerator = block.pull[kNormal];
   for (int i = 0; i < block.cone.size; ++i)
-    numerator += block.bounds[i] * block.betas[i] * block.pull[i];
+    numerator += block.state.bounds[i] * block.betas[i] * block.pull[i];
   const double normal = numerator / block.stiffness;
   for (int i = 0; i < block.cone.size; ++i)
-    block.force[i] = block.bounds[i] == 0 ? block.pull[i] * block.compliances[i]
-                                          : block.bounds[i] * block.betas[i] * normal;
+    block.force[i] = block.state.bounds[i] == 0 ? block.pull[i] * block.compliances[i]
+                                                : block.state.bounds[i] * block.betas[i] * normal;
   block.force[kNormal] = normal;
 }
 
@@ -186,10 +192,8 @@ bool DualNewton::evaluate(const Vector6& multipliers, bool keep) {
   for (Block& block : blocks_) {
     block.pull.noalias() = block.e.transpose() * multipliers;
     if (!keep) {
-      const auto bounds = block.bounds;
-      const bool loaded = block.loaded;
       project(block);
-      changed = changed || loaded != block.loaded || (loaded && bounds != block.bounds);
+      changed = changed || block.state != block.former;
       takeStiffness(block);
     }
     respond(block);
@@ -202,14 +206,16 @@ bool DualNewton::evaluate(const Vector6& multipliers, bool keep) {
 void DualNewton::takeStiffness(Block& block) {
   block.stiffness = block.costs[kNormal];
   for (int i = 0; i < block.cone.size; ++i)
-    if (block.bounds[i] != 0) block.stiffness += block.betas[i] * block.betas[i] * block.costs[i];
+    if (block.state.bounds[i] != 0)
+      block.stiffness += block.betas[i] * block.betas[i] * block.costs[i];
 }
 
 // The direction of wrenches that goes with the normal force.
 DualNewton::Vector6 DualNewton::normalDirection(const Block& block) {
   Vector6 direction = block.e.col(kNormal);
   for (int i = 0; i < block.cone.size; ++i)
-    if (block.bounds[i] != 0) direction += block.bounds[i] * block.betas[i] * block.e.col(i);
+    if (block.state.bounds[i] != 0)
+      direction += block.state.bounds[i] * block.betas[i] * block.e.col(i);
   return direction;
 }
 
@@ -217,43 +223,55 @@ DualNewton::Vector6 DualNewton::normalDirection(const Block& block) {
 void DualNewton::assembleCompliance() {
   compliance_.setZero();
   for (const Block& block : blocks_) {
-    if (!block.loaded) continue;
+    if (!block.state.loaded) continue;
     const Vector6 direction = normalDirection(block);
     compliance_.noalias() += direction * (direction / block.stiffness).transpose();
     for (int i = 0; i < block.cone.size; ++i)
-      if (block.bounds[i] == 0 && i != kNormal)
+      if (block.state.bounds[i] == 0 && i != kNormal)
         compliance_.noalias() +=
             block.e.col(i) * (block.compliances[i] * block.e.col(i)).transpose();
   }
 }
 
-// Newton's method with ε, until the state stays. Returns false if it does not.
+// Newton's method with ε, from the multipliers and the state at hand, until the state stays.
+// Returns false if it does not.
 bool DualNewton::findState() {
-  release();
-  for (Block& block : blocks_) takeStiffness(block);
-  multipliers_.setZero();
-  Vector6 gradient = -target_;
-  for (iterations_ = 1; iterations_ <= kMaximalSteps; ++iterations_) {
+  Vector6 gradient = achieved_ + slack_ * multipliers_ - target_;
+  while (iterations_ < kMaximalSteps) {
+    ++iterations_;
     assembleCompliance();
-    if (iterations_ == 1) slack_ = kSlack * compliance_.trace() / 6.;
     Matrix6 slackened = compliance_;
     slackened.diagonal().array() += slack_;
     factors_.compute(slackened);
     const Vector6 step = -factors_.solve(gradient);
     const double slope = gradient.dot(step);
     if (!(slope < 0.)) return false;
+    // The slope along the step rises from negative on. The full step is taken unless the slope is
+    // positive there; else one is sought where it has nearly vanished, or at least the state is
+    // another.
+    const Vector6 start = multipliers_;
+    for (Block& block : blocks_) block.former = block.state;
+    double length = 1., lower = 0., upper = 1., lower_slope = slope, upper_slope = 0.;
     bool changed = false;
-    double length = 1.;
     for (int cut = 0;; ++cut) {
-      if (cut > kMaximalCuts) return false;
-      const Vector6 next = multipliers_ + length * step;
-      changed = evaluate(next, false) || changed || cut > 0;
-      gradient = achieved_ + slack_ * next - target_;
+      if (cut == kMaximalCuts) return false;
+      multipliers_ = start + length * step;
+      changed = evaluate(multipliers_, false);
+      gradient = achieved_ + slack_ * multipliers_ - target_;
+      if (cut == 0 && !changed) break;
       const double end_slope = gradient.dot(step);
-      if (!(end_slope > -kOvershoot * slope)) break;
-      length *= std::max(0.1, slope / (slope - end_slope));
+      const bool descends = end_slope < 0.;
+      if (std::abs(end_slope) <= -kFlat * slope || (descends && cut == 0) ||
+          (descends && changed && cut >= kEasyCuts)) {
+        changed = true;
+        break;
+      }
+      (descends ? lower : upper) = length;
+      (descends ? lower_slope : upper_slope) = end_slope;
+      length = lower > 0. && upper > kFarApart * lower
+                   ? std::sqrt(lower * upper)
+                   : lower + (upper - lower) * lower_slope / (lower_slope - upper_slope);
     }
-    multipliers_ += length * step;
     if (!changed) return true;
   }
   return false;
@@ -263,10 +281,12 @@ bool DualNewton::findState() {
 DistributionStatus DualNewton::finish() {
   missing_.setZero();
   rank_ = 6;
+  factors_.compute(compliance_);
   const auto pivots = factors_.matrixLLT().diagonal();
   const double least = pivots.minCoeff(), largest = pivots.maxCoeff();
-  if (!(least * least > kFullRank * largest * largest) && !findRange())
-    return DistributionStatus::NumericalFailure;
+  const bool full =
+      factors_.info() == Eigen::Success && least * least > kFullRank * largest * largest;
+  if (!full && !findRange()) return DistributionStatus::NumericalFailure;
 
   if (rank_ < 6) {
     // The closest wrench is the projection on what the directions span.
@@ -276,7 +296,7 @@ DistributionStatus DualNewton::finish() {
     const double distance = missing_.norm();
     if (distance <= kReached)
       missing_.setZero();
-    else if (distance < kFar)
+    else if (distance < kFar * weights_.maxCoeff() / weights_.minCoeff())
       return DistributionStatus::NumericalFailure;
     Matrix6 reduced = Matrix6::Identity();
     reduced.topLeftCorner(rank_, rank_).noalias() = range.transpose() * compliance_ * range;
@@ -284,16 +304,17 @@ DistributionStatus DualNewton::finish() {
     multipliers_ = range * (range.transpose() * multipliers_);
   }
   const Vector6 closest = target_ - missing_;
+  const bool reached = missing_.isZero(0.);
   evaluate(multipliers_, true);
   for (int refinement = 0; refinement < kRefinements; ++refinement) {
     const Vector6 lacking = closest - achieved_;
-    if (lacking.norm() <= kMissing) break;
+    if (lacking.norm() <= (reached ? kMissing : kExact)) break;
     multipliers_ += solveRange(lacking);
     evaluate(multipliers_, true);
   }
   if (!((closest - achieved_).norm() <= kMissing) || !provesItself())
     return DistributionStatus::NumericalFailure;
-  return missing_.isZero(0.) ? DistributionStatus::Solved : DistributionStatus::Relaxed;
+  return reached ? DistributionStatus::Solved : DistributionStatus::Relaxed;
 }
 
 // The multipliers that change the wrench by as much, of those in the range.
@@ -310,10 +331,11 @@ DualNewton::Vector6 DualNewton::solveRange(const Vector6& wrench) const {
 bool DualNewton::findRange() {
   directions_.clear();
   for (const Block& block : blocks_) {
-    if (!block.loaded) continue;
+    if (!block.state.loaded) continue;
     directions_.push_back(normalDirection(block).normalized());
     for (int i = 0; i < block.cone.size; ++i)
-      if (block.bounds[i] == 0 && i != kNormal) directions_.push_back(block.e.col(i).normalized());
+      if (block.state.bounds[i] == 0 && i != kNormal)
+        directions_.push_back(block.e.col(i).normalized());
   }
   for (rank_ = 0; rank_ < 6; ++rank_) {
     double most = 0.;
@@ -339,41 +361,43 @@ bool DualNewton::findRange() {
 bool DualNewton::provesItself() {
   const double distance = missing_.norm();
   const double held = kHeld * distance, free = kFree * distance;
+  double terms = 0., costs = kRounding;
+  for (const Block& block : blocks_) {
+    for (int i = 0; i < block.cone.size; ++i) {
+      terms = std::max(terms, block.e.col(i).cwiseAbs().dot(multipliers_.cwiseAbs()));
+      costs = std::max(costs, block.costs[i] * std::abs(block.force[i]));
+    }
+  }
+  const double rounding = kRounding * (terms + costs);
+  if (terms > kCancellation * costs) return false;
+
   for (Block& block : blocks_) {
     const int size = block.cone.size;
     block.pull_of_distance.noalias() = block.e.transpose() * missing_;
     const Vector6& p = block.pull_of_distance;
     const Vector6& g = block.pull;
-    double terms = 0., costs = kRounding;
-    for (int i = 0; i < size; ++i) {
-      terms = std::max(terms, block.e.col(i).cwiseAbs().dot(multipliers_.cwiseAbs()));
-      costs = std::max(costs, block.costs[i] * std::abs(block.force[i]));
-    }
-    const double rounding = kRounding * (terms + costs);
-    if (terms > kCancellation * costs) return false;
-
     double resistance_of_distance = -p[kNormal], resistance = -g[kNormal];
     for (int i = 0; i < size; ++i) {
       if (i == kNormal) continue;
       const double beta = block.betas[i], size_of_p = std::abs(p[i]);
       if (size_of_p > free && size_of_p < held) return false;
       const bool is_held = size_of_p >= held && distance > 0.;
-      if (!block.loaded || beta == 0.) {
+      if (!block.state.loaded || beta == 0.) {
         const double bound = sign(is_held ? p[i] : g[i]);
-        block.bounds[i] = bound < 0. ? -1 : 1;
-      } else if (block.bounds[i] == 0) {
+        block.state.bounds[i] = bound < 0. ? -1 : 1;
+      } else if (block.state.bounds[i] == 0) {
         if (is_held || !(std::abs(block.force[i]) <= beta * block.force[kNormal] + kRounding))
           return false;
         continue;
-      } else if (is_held
-                     ? block.bounds[i] * p[i] < 0.
-                     : !(block.bounds[i] * (g[i] - block.costs[i] * block.force[i]) >= -rounding)) {
+      } else if (is_held ? block.state.bounds[i] * p[i] < 0.
+                         : !(block.state.bounds[i] * (g[i] - block.costs[i] * block.force[i]) >=
+                             -rounding)) {
         return false;
       }
-      resistance_of_distance -= block.bounds[i] * beta * p[i];
-      resistance -= block.bounds[i] * beta * g[i];
+      resistance_of_distance -= block.state.bounds[i] * beta * p[i];
+      resistance -= block.state.bounds[i] * beta * g[i];
     }
-    if (block.loaded) {
+    if (block.state.loaded) {
       if (!(block.force[kNormal] >= -kRounding)) return false;
       block.held = false;
       continue;
@@ -395,7 +419,23 @@ DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const
   target_ = weights_.cwiseProduct(wrench);
   for (std::size_t k = 0; k < blocks_.size(); ++k)
     blocks_[k].e.leftCols(blocks_[k].cone.size).noalias() = weights_.asDiagonal() * contacts[k].NE;
-  return findState() ? finish() : DistributionStatus::NumericalFailure;
+
+  release();
+  for (Block& block : blocks_) takeStiffness(block);
+  multipliers_.setZero();
+  achieved_.setZero();
+  assembleCompliance();
+  const double mean_compliance = compliance_.trace() / 6.;
+  for (const double slack : kSlacks) {
+    slack_ = slack * mean_compliance;
+    if (!findState()) break;
+    const Vector6 multipliers = multipliers_;
+    const DistributionStatus status = finish();
+    if (status != DistributionStatus::NumericalFailure) return status;
+    multipliers_ = multipliers;
+    evaluate(multipliers_, false);
+  }
+  return DistributionStatus::NumericalFailure;
 }
 
 void DualNewton::writeAnswer(DistributionResult& result, double unit, double overall_weight) const {
@@ -413,8 +453,8 @@ void DualNewton::writeAnswer(DistributionResult& result, double unit, double ove
     double of_normal = block.costs[kNormal] * block.force[kNormal] - block.pull[kNormal];
     double of_distance = -block.pull_of_distance[kNormal];
     for (int i = 0; i < size; ++i) {
-      if (block.bounds[i] == 0) continue;
-      const double bound = block.bounds[i];
+      if (block.state.bounds[i] == 0) continue;
+      const double bound = block.state.bounds[i];
       const BoxCone::Side& side = block.cone.sides[static_cast<std::size_t>(i)];
       const std::size_t which = bound > 0. ? 0 : 1;
       const double multiplier = bound * (block.pull[i] - block.costs[i] * block.force[i]);
@@ -426,7 +466,7 @@ void DualNewton::writeAnswer(DistributionResult& result, double unit, double ove
       of_normal -= block.betas[i] * multiplier;
       of_distance -= block.betas[i] * multiplier_of_distance;
     }
-    if (block.loaded) continue;
+    if (block.state.loaded) continue;
     contact.active[block.cone.normal_row] = true;
     contact.multipliers[block.cone.normal_row] = cost_scale * of_normal / block.cone.normal_factor;
     contact.relaxation_multipliers[block.cone.normal_row] =

@@ -75,6 +75,16 @@ class DualNewton {
  private:
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+  /// Whether a contact bears a load, and which of its components are at which bound, ±1.
+  struct State {
+    bool loaded = false;
+    std::array<signed char, 6> bounds = {};
+
+    bool operator!=(const State& other) const {
+      return loaded != other.loaded || (loaded && bounds != other.bounds);
+    }
+  };
+
   struct Block {
     BoxCone cone;
     Vector6 costs, compliances;  // wᵢ² over the largest, and their inverses
@@ -83,8 +93,7 @@ class DualNewton {
     // Of the multipliers at hand: eᵀ ν, λ(ν), whether there is a load, and which components are at
     // which bound.
     Vector6 pull, force;
-    bool loaded = false;
-    std::array<signed char, 6> bounds = {};
+    State state, former;
     double stiffness = 0.;
     Vector6 pull_of_distance;
     bool held = false;

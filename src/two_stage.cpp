@@ -46,7 +46,7 @@ struct Tolerances {
   static constexpr Scalar kRounding = 1e-15 * kRoundoff<Scalar>;
   static constexpr Scalar kParallel = 1e-9 * kRoundoff<Scalar>;
   // A distance that has few digits, where the wrench weights are equal, and forces that do.
-  static constexpr Scalar kNearBoundary = 1e-5;
+  static constexpr Scalar kNearBoundary = 1e-4;
   static constexpr Scalar kLargeForces = 100.;
   // Of the cheapest forces on a face: √ε, how many steps, and when nothing is missing any more.
   static constexpr Scalar kSlack = 1e-4 * kRoundoffRoot<Scalar>;
