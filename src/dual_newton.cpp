@@ -18,8 +18,8 @@ constexpr int kNormal = BoxCone::kNormal;
 constexpr double kSlacks[] = {1e-5, 1e-8, 1e-11};
 constexpr int kMaximalSteps = 50;
 // Along a step, what part of the slope at its start is as good as none; how often it is cut, and
-// how often until it is enough to have come to another state; and when two lengths are not compared
-// by their difference.
+// how often until it is enough to have come to another state; and for which ratio of two lengths
+// the middle is the geometric one.
 constexpr double kFlat = 0.3;
 constexpr int kMaximalCuts = 30;
 constexpr int kEasyCuts = 3;
@@ -170,36 +170,58 @@ void DualNewton::project(Block& block) {
   }
 }
 
-// The forces for the pull at hand, components at their bounds staying there.
-void DualNewton::respond(Block& block) {
-  block.force.setZero();
-  if (!block.state.loaded) return;
-  double numerator = block.pull[kNormal];
+// The forces for a pull, components at their bounds staying there.
+DualNewton::Vector6 DualNewton::respond(const Block& block, const Vector6& pull) {
+  Vector6 force = Vector6::Zero();
+  if (!block.state.loaded) return force;
+  double numerator = pull[kNormal];
   for (int i = 0; i < block.cone.size; ++i)
-    numerator += block.state.bounds[i] * block.betas[i] * block.pull[i];
+    numerator += block.state.bounds[i] * block.betas[i] * pull[i];
   const double normal = numerator / block.stiffness;
   for (int i = 0; i < block.cone.size; ++i)
-    block.force[i] = block.state.bounds[i] == 0 ? block.pull[i] * block.compliances[i]
-                                                : block.state.bounds[i] * block.betas[i] * normal;
-  block.force[kNormal] = normal;
+    force[i] = block.state.bounds[i] == 0 ? pull[i] * block.compliances[i]
+                                          : block.state.bounds[i] * block.betas[i] * normal;
+  force[kNormal] = normal;
+  return force;
 }
 
-// The forces for multipliers of the wrench, and what they give. Unless the state is kept, it
-// becomes theirs; returns whether it was another before.
-bool DualNewton::evaluate(const Vector6& multipliers, bool keep) {
+// The forces for the multipliers at hand, in the state that they want. Returns whether it is
+// another than the former.
+bool DualNewton::evaluate() {
   bool changed = false;
   achieved_.setZero();
   for (Block& block : blocks_) {
-    block.pull.noalias() = block.e.transpose() * multipliers;
-    if (!keep) {
-      project(block);
-      changed = changed || block.state != block.former;
-      takeStiffness(block);
-    }
-    respond(block);
+    block.pull.noalias() = block.e.transpose() * multipliers_;
+    project(block);
+    takeStiffness(block);
+    block.force = respond(block, block.pull);
     achieved_.noalias() += block.e * block.force;
+    changed = changed || block.state != block.former;
   }
   return changed;
+}
+
+// Begins anew with multipliers in the state at hand.
+void DualNewton::restart(const Vector6& multipliers) {
+  multipliers_.setZero();
+  for (Block& block : blocks_) {
+    block.pull.setZero();
+    block.force.setZero();
+  }
+  correct(multipliers);
+}
+
+// Changes the multipliers in the state at hand. The forces change by what they respond to the
+// change, which is more accurate than what they respond to the sum.
+void DualNewton::correct(const Vector6& change) {
+  multipliers_ += change;
+  achieved_.setZero();
+  for (Block& block : blocks_) {
+    const Vector6 pull = block.e.transpose() * change;
+    block.pull += pull;
+    block.force += respond(block, pull);
+    achieved_.noalias() += block.e * block.force;
+  }
 }
 
 // What the normal force and all that goes with it cost.
@@ -245,7 +267,7 @@ bool DualNewton::findState() {
     factors_.compute(slackened);
     const Vector6 step = -factors_.solve(gradient);
     const double slope = gradient.dot(step);
-    if (!(slope < 0.)) return false;
+    if (!(slope < 0.)) return gradient.norm() <= kMissing;
     // The slope along the step rises from negative on. The full step is taken unless the slope is
     // positive there; else one is sought where it has nearly vanished, or at least the state is
     // another.
@@ -256,7 +278,7 @@ bool DualNewton::findState() {
     for (int cut = 0;; ++cut) {
       if (cut == kMaximalCuts) return false;
       multipliers_ = start + length * step;
-      changed = evaluate(multipliers_, false);
+      changed = evaluate();
       gradient = achieved_ + slack_ * multipliers_ - target_;
       if (cut == 0 && !changed) break;
       const double end_slope = gradient.dot(step);
@@ -268,9 +290,12 @@ bool DualNewton::findState() {
       }
       (descends ? lower : upper) = length;
       (descends ? lower_slope : upper_slope) = end_slope;
-      length = lower > 0. && upper > kFarApart * lower
-                   ? std::sqrt(lower * upper)
-                   : lower + (upper - lower) * lower_slope / (lower_slope - upper_slope);
+      // By turns where a straight line between both would vanish, and in the middle.
+      if (cut % 2 == 0)
+        length = lower + (upper - lower) * lower_slope / (lower_slope - upper_slope);
+      else
+        length = upper > kFarApart * lower && lower > 0. ? std::sqrt(lower * upper)
+                                                         : 0.5 * (lower + upper);
     }
     if (!changed) return true;
   }
@@ -301,16 +326,14 @@ DistributionStatus DualNewton::finish() {
     Matrix6 reduced = Matrix6::Identity();
     reduced.topLeftCorner(rank_, rank_).noalias() = range.transpose() * compliance_ * range;
     factors_.compute(reduced);
-    multipliers_ = range * (range.transpose() * multipliers_);
+    restart(range * (range.transpose() * multipliers_));
   }
   const Vector6 closest = target_ - missing_;
   const bool reached = missing_.isZero(0.);
-  evaluate(multipliers_, true);
   for (int refinement = 0; refinement < kRefinements; ++refinement) {
     const Vector6 lacking = closest - achieved_;
     if (lacking.norm() <= (reached ? kMissing : kExact)) break;
-    multipliers_ += solveRange(lacking);
-    evaluate(multipliers_, true);
+    correct(solveRange(lacking));
   }
   if (!((closest - achieved_).norm() <= kMissing) || !provesItself())
     return DistributionStatus::NumericalFailure;
@@ -433,7 +456,7 @@ DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const
     const DistributionStatus status = finish();
     if (status != DistributionStatus::NumericalFailure) return status;
     multipliers_ = multipliers;
-    evaluate(multipliers_, false);
+    evaluate();
   }
   return DistributionStatus::NumericalFailure;
 }

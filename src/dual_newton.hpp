@@ -102,9 +102,11 @@ class DualNewton {
   void release();
   static void project(Block& block);
   static void takeStiffness(Block& block);
-  static void respond(Block& block);
+  static Vector6 respond(const Block& block, const Vector6& pull);
   static Vector6 normalDirection(const Block& block);
-  bool evaluate(const Vector6& multipliers, bool keep);
+  bool evaluate();
+  void restart(const Vector6& multipliers);
+  void correct(const Vector6& change);
   void assembleCompliance();
   bool findState();
   bool findRange();

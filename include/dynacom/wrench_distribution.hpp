@@ -70,7 +70,7 @@ struct DYNACOM_EXPORT DistributionResult {
   Vector6 wrench_weights = Vector6::Ones();    ///< D
   double scale = kNaN;                         ///< of ‖D w‖, what tolerances are relative to
   double cost = kNaN;                          ///< ½ Σ (wᵢ λᵢ)²
-  int iterations = 0;                          ///< of the active-set method, in both stages
+  int iterations = 0;                          ///< steps of all solvers that were asked
   std::vector<Contact> contacts;               ///< in the order of WrenchDistribution::add()
   /// Multipliers ν of NE λ = achieved in the minimum of the cost: W² λ = NEᵀ ν − Aᵀ μ.
   Vector6 wrench_multipliers = Vector6::Constant(kNaN);
