@@ -445,8 +445,7 @@ DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const
 
   release();
   for (Block& block : blocks_) takeStiffness(block);
-  multipliers_.setZero();
-  achieved_.setZero();
+  restart(Vector6::Zero());
   assembleCompliance();
   const double mean_compliance = compliance_.trace() / 6.;
   for (const double slack : kSlacks) {

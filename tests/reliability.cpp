@@ -55,9 +55,10 @@ int main(int argc, char** argv) {
   ProblemGenerator generator(static_cast<unsigned long>(seed));
   std::array<Tally, kPlaceNames.size()> tallies;
   Tally all, nearly_parallel, weights_far_apart;
+  dynacom::WrenchDistribution distribution;  // one for all: what was before must not matter
   for (long i = 0; i < problems; ++i) {
     const Problem problem = generator.next();
-    dynacom::WrenchDistribution distribution;
+    distribution.clear();
     distribution.setWrenchWeights(problem.wrench_weights);
     for (const auto& contact : problem.makeContacts()) distribution.add(*contact);
     distribution.solve(problem.wrench, problem.minimal_scale);

@@ -12,6 +12,7 @@
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "dynacom/dyna_com.hpp"
+#include "feet.hpp"
 #include "random_robot.hpp"
 
 namespace {
@@ -87,22 +88,12 @@ struct Standing {
     for (int i = 0; i < (onPoints ? 4 : 2); ++i) {
       const std::string frame = "sole" + std::to_string(i);
       for (const bool active : {true, false}) {
-        std::shared_ptr<ContactBase> contact;
+        std::shared_ptr<ContactBase> contact = makeSole(frame);
         if (onPoints) {
-          ContactPointSettings settings;
-          settings.mu = 0.7;
-          settings.frame_name = frame;
+          ContactPointSettings settings = makePoint(frame)->getSettings();
           settings.world_aligned = i % 2 == 0;
           settings.radius = 0.01;
           contact = std::make_shared<ContactPoint>(settings);
-        } else {
-          Contact6DSettings settings;
-          settings.mu = 0.7;
-          settings.gu = 0.1;
-          settings.half_length = 0.1;
-          settings.half_width = 0.06;
-          settings.frame_name = frame;
-          contact = std::make_shared<Contact6D>(settings);
         }
         dynacom.addContact(contact, frame + (active ? "" : " idle"), active);
       }

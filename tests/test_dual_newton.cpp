@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "dual_newton.hpp"
-#include "dynacom/contact6d.hpp"
-#include "dynacom/contact_point.hpp"
+#include "feet.hpp"
 #include "test_tools.hpp"
 #include "two_stage.hpp"
 
@@ -23,24 +22,6 @@ using Vector6 = DistributionResult::Vector6;
 
 namespace {
 
-Contact6DSettings soleSettings() {
-  Contact6DSettings settings;
-  settings.frame_name = "sole";
-  settings.mu = 0.7;
-  settings.gu = 0.1;
-  settings.half_length = 0.1;
-  settings.half_width = 0.06;
-  settings.weights << 1., 1., 0.5, 2., 2., 3.;
-  return settings;
-}
-
-ContactPointSettings pointSettings() {
-  ContactPointSettings settings;
-  settings.frame_name = "point";
-  settings.mu = 0.6;
-  return settings;
-}
-
 MatrixXd inequalities(const ContactBase& contact) {
   MatrixXd A(contact.uni_rows() + contact.fri_rows(), contact.cols());
   A << contact.uni_A(), contact.fri_A();
@@ -51,11 +32,8 @@ MatrixXd inequalities(const ContactBase& contact) {
 std::vector<DistributionResult::Contact> feet(Random& random) {
   std::vector<DistributionResult::Contact> contacts;
   for (Index count = random.integer(1, 4); count > 0; --count) {
-    std::shared_ptr<ContactBase> contact;
-    if (random.coin())
-      contact = std::make_shared<Contact6D>(soleSettings());
-    else
-      contact = std::make_shared<ContactPoint>(pointSettings());
+    std::shared_ptr<ContactBase> contact = makePoint("foot");
+    if (random.coin()) contact = makeSole("foot");
     const Vector3d tilt = random.vector(3, 0.2), place(0., 0., -1.);
     contact->updateNewtonEuler(
         Vector3d::Zero(),
@@ -76,16 +54,16 @@ std::vector<DistributionResult::Contact> feet(Random& random) {
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(cones_of_points_and_soles_are_boxes) {
-  const Contact6D sole(soleSettings());
-  const auto box = BoxCone::recognise(inequalities(sole));
+  const auto sole = makeSole("foot");
+  const auto box = BoxCone::recognise(inequalities(*sole));
   BOOST_REQUIRE(box.has_value());
   BOOST_TEST(box->size == 6);
   const double betas[] = {0.7, 0.7, 0., 0.06, 0.1, 0.1};
   for (std::size_t i = 0; i < 6; ++i) BOOST_TEST(box->sides[i].beta == betas[i]);
-  BOOST_TEST(BoxCone::recognise(inequalities(ContactPoint(pointSettings()))).has_value());
+  BOOST_TEST(BoxCone::recognise(inequalities(*makePoint("foot"))).has_value());
 
   // Rows in another order and of another length are the same cone.
-  MatrixXd A = inequalities(sole).colwise().reverse();
+  MatrixXd A = inequalities(*sole).colwise().reverse();
   A.row(3) *= 7.;
   const auto scaled = BoxCone::recognise(A);
   BOOST_REQUIRE(scaled.has_value());
@@ -94,7 +72,7 @@ BOOST_AUTO_TEST_CASE(cones_of_points_and_soles_are_boxes) {
 }
 
 BOOST_AUTO_TEST_CASE(other_cones_are_not) {
-  const MatrixXd A = inequalities(Contact6D(soleSettings()));
+  const MatrixXd A = inequalities(*makeSole("foot"));
   const auto refused = [&](const char* what, auto change) {
     MatrixXd other = A;
     change(other);
@@ -153,6 +131,26 @@ BOOST_AUTO_TEST_CASE(the_answer_is_that_of_the_other_solver) {
   BOOST_TEST(relaxed > trials / 4);
   BOOST_TEST(left < trials / 50);
   BOOST_TEST_MESSAGE(solved << " solved, " << relaxed << " relaxed, " << left << " left");
+}
+
+BOOST_AUTO_TEST_CASE(no_wrench_wants_no_forces_whatever_was_before) {
+  Random random(93);
+  for (int trial = 0; trial < 50; ++trial) {
+    DistributionResult result;
+    result.contacts = feet(random);
+    DualNewton newton;
+    newton.setContacts(result.contacts);
+    for (const double size : {1., 0., 1e-15}) {
+      const Vector6 wrench = size * Vector6::Unit(2);
+      const DistributionStatus status = newton.solve(result.contacts, wrench, Vector6::Ones());
+      if (status == DistributionStatus::NumericalFailure) continue;
+      newton.writeAnswer(result, 1., 1.);
+      Vector6 achieved = Vector6::Zero();
+      for (const auto& contact : result.contacts) achieved += contact.NE * contact.force;
+      BOOST_TEST((status == DistributionStatus::Relaxed || (achieved - wrench).norm() < 1e-11));
+      BOOST_TEST((size == 1. || achieved.norm() < 1e-11));
+    }
+  }
 }
 
 BOOST_AUTO_TEST_CASE(where_no_inequality_is_active_one_step_is_enough) {

@@ -18,6 +18,7 @@
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "dynacom/dyna_com.hpp"
+#include "feet.hpp"
 #include "random_robot.hpp"
 
 using namespace dynacom;
@@ -27,23 +28,6 @@ namespace {
 
 const double kNaN = std::numeric_limits<double>::quiet_NaN();
 const double kInfinity = std::numeric_limits<double>::infinity();
-
-std::shared_ptr<Contact6D> makeSole(const std::string& frame, double mu = 0.7) {
-  Contact6DSettings settings;
-  settings.mu = mu;
-  settings.gu = 0.1;
-  settings.half_length = 0.1;
-  settings.half_width = 0.06;
-  settings.frame_name = frame;
-  return std::make_shared<Contact6D>(settings);
-}
-
-std::shared_ptr<ContactPoint> makePoint(const std::string& frame, double mu = 0.7) {
-  ContactPointSettings settings;
-  settings.mu = mu;
-  settings.frame_name = frame;
-  return std::make_shared<ContactPoint>(settings);
-}
 
 /// A robot with two soles on the ground, and its DynaCoM.
 struct Biped {

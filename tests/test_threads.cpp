@@ -13,6 +13,7 @@
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "dynacom/motion.hpp"
+#include "feet.hpp"
 #include "random_robot.hpp"
 
 using namespace dynacom;
@@ -57,20 +58,10 @@ DynaCoM makeRobot() {
   DynaCoM robot(model);
   for (int i = 0; i < 4; ++i) {
     const std::string frame = "sole" + std::to_string(i);
-    if (i < 2) {
-      Contact6DSettings settings;
-      settings.mu = 0.7;
-      settings.gu = 0.1;
-      settings.half_length = 0.1;
-      settings.half_width = 0.06;
-      settings.frame_name = frame;
-      robot.addContact(std::make_shared<Contact6D>(settings), frame);
-    } else {
-      ContactPointSettings settings;
-      settings.mu = 0.7;
-      settings.frame_name = frame;
-      robot.addContact(std::make_shared<ContactPoint>(settings), frame);
-    }
+    if (i < 2)
+      robot.addContact(makeSole(frame), frame);
+    else
+      robot.addContact(makePoint(frame), frame);
   }
   robot.setGroundHeight(-0.1);
   robot.setWrenchWeights((Vector6() << 1., 1., 1., 2., 2., 2.).finished());
