@@ -115,7 +115,7 @@ void exposeWrenchDistribution() {
                           "Of the norm of wrenches, what tolerances are relative to.")
             .def_readonly("cost", &DistributionResult::cost, "Half the sum of (w_i lambda_i)^2.")
             .def_readonly("iterations", &DistributionResult::iterations,
-                          "Of the active-set method, in both stages.")
+                          "Steps of all solvers that were asked.")
             .add_property("contacts", &getContacts,
                           "One DistributionResult.Contact each, in the order of add().")
             .add_property("wrench_multipliers", getter(&DistributionResult::wrench_multipliers),
