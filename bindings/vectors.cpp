@@ -53,7 +53,10 @@ std::string toText(const std::vector<std::string>& names) {
 }
 
 void setKnownAttribute(const bp::object& self, const bp::str& name, const bp::object& value) {
-  if (!PyObject_HasAttr(bp::object(self.attr("__class__")).ptr(), name.ptr())) {
+  // Classes of a user's own, derived from ours, may have what they like.
+  PyObject* const type = reinterpret_cast<PyObject*>(Py_TYPE(self.ptr()));
+  const bool ours = PyMapping_HasKeyString(Py_TYPE(self.ptr())->tp_dict, "__setattr__") != 0;
+  if (ours && !PyObject_HasAttr(type, name.ptr())) {
     PyErr_Format(PyExc_AttributeError, "'%s' has no attribute '%U'", Py_TYPE(self.ptr())->tp_name,
                  name.ptr());
     bp::throw_error_already_set();

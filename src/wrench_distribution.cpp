@@ -15,7 +15,6 @@ namespace dynacom {
 namespace {
 
 using internal::DualNewton;
-using internal::kLeastMultiplier;
 using internal::kMultiplied;
 using internal::kReach;
 using internal::throwInvalid;
@@ -28,8 +27,8 @@ using NewtonEuler = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
 // Forces below this are as good as none.
 constexpr double kNegligible = 1e-9;
-// What a residual's pull on forces may be by rounding.
-constexpr double kPullRounding = 1e-11;
+// How many units in the last place of its terms a sum may be off.
+constexpr double kRounding = 8.;
 // By what tolerance of DistributionResult::isOptimal() an answer proves itself.
 constexpr double kProof = 1e-8;
 // The margin's search has arrived when it is this close to what can be reached, or when a step
@@ -114,52 +113,60 @@ bool DistributionResult::isOptimal(double tolerance) const {
   // The relaxation's multipliers say what holds on the face of the closest wrench. They are to be
   // believed where they are more than rounding, and what they must be themselves is looked at.
   const Vector6 pull = weighted(wrench_weights.cwiseAbs2(), residual);
-  const double least_of_distance =
-      overall_weight * std::max(kMultiplied * size, kLeastMultiplier * scale);
+  Vector6 terms = wrench.cwiseAbs();  // of the residual, without signs
   bool relaxed = status == DistributionStatus::Relaxed;
-  for (const Contact& contact : contacts)
+  for (const Contact& contact : contacts) {
+    for (Eigen::Index i = 0; i < contact.force.size(); ++i)
+      terms += std::abs(contact.force[i]) * contact.NE.col(i).cwiseAbs();
     relaxed = relaxed || !contact.relaxation_multipliers.isZero(0.);
-  if (relaxed &&
-      !(std::abs(pull.dot(achieved)) <= (tolerance * size + kPullRounding * scale) * scale))
+  }
+  const Vector6 rounding = kRounding * std::numeric_limits<double>::epsilon() *
+                           weighted(wrench_weights.cwiseAbs2(), terms);
+  const double least_of_distance =
+      std::max(kMultiplied * overall_weight * size, rounding.maxCoeff());
+  if (relaxed && !(std::abs(pull.dot(achieved)) <=
+                   tolerance * scale * size + rounding.dot(achieved.cwiseAbs())))
     return false;
 
   Vector6 given = Vector6::Zero();
-  double all_costs = 0., complementarity = 0., nothing = 0.;
+  double all_costs = 0., gap = 0., nothing = 0.;
   for (const Contact& contact : contacts) {
     given += contact.NE * contact.force;
     const auto cost_weights = contact.weights.cwiseAbs2();
-    double terms = kNegligible * unit * cost_weights.maxCoeff();
-    for (Eigen::Index i = 0; i < contact.force.size(); ++i)
-      terms = std::max({terms, std::abs(cost_weights[i] * contact.force[i]),
-                        contact.NE.col(i).cwiseAbs().dot(wrench_multipliers.cwiseAbs()),
-                        contact.A.col(i).cwiseAbs().dot(contact.multipliers.cwiseAbs())});
+    const double gradient_size =
+        std::max(kNegligible * unit * cost_weights.maxCoeff(),
+                 cost_weights.cwiseProduct(contact.force.cwiseAbs()).maxCoeff());
 
     // The minimum of the cost: W² λ − NEᵀ ν + Aᵀ μ = 0. That of the distance: NEᵀ D² r = Aᵀ μ'.
-    const double rounding = (tolerance * pull.lpNorm<Eigen::Infinity>() +
-                             kPullRounding * unit * wrench_weights.cwiseAbs2().maxCoeff()) *
-                            std::max(1., contact.NE.lpNorm<Eigen::Infinity>());
+    // What the former lacks, e, and slacks that are multiplied, leave a gap between the cost and
+    // the least: that of the dual is − ½ ‖W⁻¹ (W² λ − e)‖² + νᵀ w*.
+    const double enough_of_distance = tolerance * pull.lpNorm<Eigen::Infinity>() *
+                                      std::max(1., contact.NE.lpNorm<Eigen::Infinity>());
     for (Eigen::Index i = 0; i < contact.force.size(); ++i) {
-      const double of_cost = cost_weights[i] * contact.force[i] -
+      const double lacking = cost_weights[i] * contact.force[i] -
                              contact.NE.col(i).dot(wrench_multipliers) +
                              contact.A.col(i).dot(contact.multipliers);
       const double of_distance =
           contact.NE.col(i).dot(pull) - contact.A.col(i).dot(contact.relaxation_multipliers);
-      if (!(std::abs(of_cost) <= tolerance * terms)) return false;
-      if (relaxed && !(std::abs(of_distance) <= rounding)) return false;
+      if (relaxed && !(std::abs(of_distance) <=
+                       enough_of_distance + contact.NE.col(i).cwiseAbs().dot(rounding)))
+        return false;
+      gap += std::abs(lacking * contact.force[i]) + 0.5 * lacking * lacking / cost_weights[i];
     }
     for (Eigen::Index j = 0; j < contact.A.rows(); ++j) {
       const double slack = contact.A.row(j).dot(contact.force);
       const double multiplier = contact.multipliers[j];
       const double of_distance = contact.relaxation_multipliers[j];
       if (!(slack <= tolerance * unit) || !(of_distance >= 0.)) return false;
-      if (!(of_distance > least_of_distance) && !(multiplier >= -tolerance * terms)) return false;
+      if (!(of_distance > least_of_distance) && !(multiplier >= -tolerance * gradient_size))
+        return false;
       if (multiplier != 0. && !(std::abs(slack) <= tolerance * unit)) return false;
-      complementarity += std::abs(multiplier * slack);
+      gap += std::abs(multiplier * slack);
     }
     all_costs += cost_weights.dot(contact.force.cwiseAbs2());
     nothing = std::max(nothing, kNegligible * unit * contact.weights.maxCoeff());
   }
-  return complementarity <= tolerance * (all_costs + nothing * nothing) &&
+  return gap <= tolerance * (all_costs + nothing * nothing) &&
          weighted(wrench_weights, given - achieved).norm() <= tolerance * scale &&
          weighted(wrench_weights, wrench - achieved - residual).norm() <= tolerance * scale;
 }
@@ -365,6 +372,11 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
     answered = work.distribute();
   }
 
+  // Multipliers may be beyond the largest numbers where forces are not.
+  if (answered && !result.wrench_multipliers.allFinite()) {
+    answered = work.has_answer = false;
+    result.status = DistributionStatus::NumericalFailure;
+  }
   if (answered) {
     work.has_answer = true;
   } else {

@@ -1378,7 +1378,7 @@ BOOST_AUTO_TEST_CASE(every_condition_of_optimality_is_looked_at) {
   // They could push less, and come closer.
   BOOST_TEST(!write(relaxed, -50., 100., 50., {50., 50.}, none, {150., 150.}).isOptimal());
   // The relaxation's multipliers excuse a negative one, but only where they are right.
-  for (const double multiplier : {1e-300, 1e-12, 1.}) {
+  for (const double multiplier : {1e-300, 1e-12, 1e-10, 1e-9, 1.}) {
     const Vector2d excuse(0., multiplier);
     DistributionResult result = write(solved, 100., 100., 100., {100., 0.}, {0., -100.}, excuse);
     BOOST_TEST(!result.isOptimal());
@@ -1392,6 +1392,17 @@ BOOST_AUTO_TEST_CASE(every_condition_of_optimality_is_looked_at) {
   // Small slacks times large multipliers: much cheaper forces may be next to these.
   const double slack = 1e-7;
   BOOST_TEST(!write(solved, 100., 100., 1e8, {100. - slack, slack}, {1e8, 1e8}, none).isOptimal());
+  // Large multipliers of opposite sides that hide a cheaper answer: the second would better push.
+  DistributionResult squeezed = write(solved, 100., 100., 50., {90., 10.}, none, none);
+  for (DistributionResult::Contact& contact : squeezed.contacts) {
+    contact.A = (MatrixXd(3, 1) << -1., 1e-9, -1e-9).finished();
+    contact.force[0] = 0.5 * contact.force[0];
+    contact.multipliers = VectorXd::Constant(3, 1e17);
+    contact.multipliers[0] = 0.;
+    contact.relaxation_multipliers.setZero(3);
+    contact.active.setConstant(3, true);
+  }
+  BOOST_TEST(!squeezed.isOptimal());
   // Other names for the same.
   BOOST_TEST(!write(relaxed, 100., 100., 50., {50., 50.}, none, none).isOptimal());
   DistributionResult nothing = write(DistributionStatus::NoContact, 100., 0., 0., none, none, none);

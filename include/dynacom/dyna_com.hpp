@@ -280,7 +280,7 @@ class DYNACOM_EXPORT DynaCoM {
   CentroidalWrench ground_wrench_;
   Vector6 ext_wrench_;
   CentroidalState feasible_;  // the state with the accelerations that contacts can cause
-  CentroidalState pressing_;  // the motion that the CoP is of, and the VRP: one or the other
+  CentroidalState pressing_;  // state_ or feasible_: the motion whose CoP and VRP are reported
   Eigen::Vector2d cop_, vrp_, nl_;
 
   std::vector<Entry> contacts_;  // the active ones first

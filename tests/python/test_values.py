@@ -84,6 +84,16 @@ def test_misspelt_attributes_are_refused(objects):
         sole().mu = 0.1
 
 
+def test_classes_derived_from_ours_may_have_attributes():
+    class Named(DynaCoM):
+        def __init__(self):
+            super().__init__()
+            self.name = "talos"
+
+    assert Named().name == "talos"
+    assert not Named().isInitialized()
+
+
 def test_nothing_prints_an_address(objects):
     for name, value in objects.items():
         for text in (str(value), repr(value)):
