@@ -29,6 +29,8 @@ using NewtonEuler = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 constexpr double kNegligible = 1e-9;
 // How many units in the last place of its terms a sum may be off.
 constexpr double kRounding = 8.;
+// How far the wrench of an answer may be from the closest one.
+constexpr double kInaccuracy = 1e-11;
 // By what tolerance of DistributionResult::isOptimal() an answer proves itself.
 constexpr double kProof = 1e-8;
 // The margin's search has arrived when it is this close to what can be reached, or when a step
@@ -140,26 +142,29 @@ bool DistributionResult::isOptimal(double tolerance) const {
     // The minimum of the cost: W² λ − NEᵀ ν + Aᵀ μ = 0. That of the distance: NEᵀ D² r = Aᵀ μ'.
     // What the former lacks, e, and slacks that are multiplied, leave a gap between the cost and
     // the least: that of the dual is − ½ ‖W⁻¹ (W² λ − e)‖² + νᵀ w*.
-    const double enough_of_distance = tolerance * pull.lpNorm<Eigen::Infinity>() *
-                                      std::max(1., contact.NE.lpNorm<Eigen::Infinity>());
+    // The latter may lack as much as w* may be off, but then no multiplier is believed that is
+    // less.
+    const double largest = std::max(1., contact.NE.lpNorm<Eigen::Infinity>());
+    const double enough = tolerance * pull.lpNorm<Eigen::Infinity>() * largest;
+    const double inaccuracy = kInaccuracy * unit * wrench_weights.cwiseAbs2().maxCoeff() * largest;
+    double believed = least_of_distance;
     for (Eigen::Index i = 0; i < contact.force.size(); ++i) {
       const double lacking = cost_weights[i] * contact.force[i] -
                              contact.NE.col(i).dot(wrench_multipliers) +
                              contact.A.col(i).dot(contact.multipliers);
-      const double of_distance =
-          contact.NE.col(i).dot(pull) - contact.A.col(i).dot(contact.relaxation_multipliers);
-      if (relaxed && !(std::abs(of_distance) <=
-                       enough_of_distance + contact.NE.col(i).cwiseAbs().dot(rounding)))
-        return false;
       gap += std::abs(lacking * contact.force[i]) + 0.5 * lacking * lacking / cost_weights[i];
+      const double of_distance = std::abs(contact.NE.col(i).dot(pull) -
+                                          contact.A.col(i).dot(contact.relaxation_multipliers));
+      if (relaxed && !(of_distance <= enough + inaccuracy)) return false;
+      if (!(of_distance <= enough + contact.NE.col(i).cwiseAbs().dot(rounding)))
+        believed = std::max(believed, of_distance);
     }
     for (Eigen::Index j = 0; j < contact.A.rows(); ++j) {
       const double slack = contact.A.row(j).dot(contact.force);
       const double multiplier = contact.multipliers[j];
       const double of_distance = contact.relaxation_multipliers[j];
       if (!(slack <= tolerance * unit) || !(of_distance >= 0.)) return false;
-      if (!(of_distance > least_of_distance) && !(multiplier >= -tolerance * gradient_size))
-        return false;
+      if (!(of_distance > believed) && !(multiplier >= -tolerance * gradient_size)) return false;
       if (multiplier != 0. && !(std::abs(slack) <= tolerance * unit)) return false;
       gap += std::abs(multiplier * slack);
     }
