@@ -62,6 +62,11 @@ void ContactSchedule::validate(Eigen::Index frames) const {
   internal::requireSize("active", active.cols(), frames, "frames");
 }
 
+void AnalysisSettings::validate() const {
+  internal::requireField(omega >= 0. && std::isfinite(omega), "AnalysisSettings.omega",
+                         "finite and >= 0 rad/s", omega);
+}
+
 MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
                              const ContactSchedule& schedule, const AnalysisSettings& settings) {
   if (!robot.isInitialized())
@@ -69,7 +74,7 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
   const Eigen::Index frames = motion.frames();
   motion.validate(robot.getModel());
   schedule.validate(frames);
-  if (!(settings.omega >= 0.)) throwInvalid("omega must be >= 0 rad/s, got ", settings.omega);
+  settings.validate();
 
   DynaCoM worker(robot);
   MotionAnalysis result;

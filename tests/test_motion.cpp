@@ -323,12 +323,14 @@ BOOST_AUTO_TEST_CASE(a_schedule_that_is_not_valid_is_refused) {
 
 BOOST_AUTO_TEST_CASE(an_omega_out_of_range_is_refused) {
   const Walk walk(10);
-  for (const double omega : {-0.25, kNaN}) {
+  for (const double omega : {-0.25, kNaN, std::numeric_limits<double>::infinity()}) {
     AnalysisSettings settings;
     settings.omega = omega;
     BOOST_TEST(throws<std::invalid_argument>(
         [&] { analyzeMotion(walk.robot, walk.motion, walk.schedule, settings); },
-        {"omega", omega < 0. ? "-0.25" : "nan"}));
+        {"AnalysisSettings.omega", omega < 0.          ? "-0.25"
+                                   : std::isnan(omega) ? "nan"
+                                                       : "inf"}));
   }
 }
 

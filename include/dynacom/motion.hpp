@@ -37,7 +37,7 @@ struct DYNACOM_EXPORT ContactSchedule {
 };
 
 /// What analyzeMotion() needs to know besides.
-struct AnalysisSettings {
+struct DYNACOM_EXPORT AnalysisSettings {
   /// Whether the centre of pressure is that of flat horizontal ground; see
   /// DynaCoM::computeDynamics.
   bool flat_horizontal_ground = true;
@@ -46,6 +46,9 @@ struct AnalysisSettings {
   double omega = 0.;
   /// Called now and then with the number of frames done.
   std::function<void(Eigen::Index)> progress;
+
+  /// @throws std::invalid_argument unless omega is finite and >= 0
+  void validate() const;
 };
 
 /// What analyzeMotion() found: one column per frame, in the world's axes, SI units.

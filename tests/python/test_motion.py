@@ -286,7 +286,7 @@ def test_no_omega(robot, model, motion, schedule):
 
 @pytest.mark.parametrize("omega", [-1.0, np.nan, -np.inf])
 def test_omega_out_of_range(robot, motion, schedule, omega):
-    with pytest.raises(ValueError, match=f"omega must be >= 0 rad/s, got {omega:g}"):
+    with pytest.raises(ValueError, match=f"omega must be finite and >= 0 rad/s, got {omega:g}"):
         dynacom.analyzeMotion(robot, motion, schedule, omega=omega)
 
 
