@@ -22,26 +22,23 @@ constexpr int kMaximalCuts = 30;
 constexpr int kEasyCuts = 3;
 // For which ratio of two lengths their middle is the geometric one.
 constexpr double kFarApart = 4.;
-// What part of the largest compliance the least must be, so that nothing needs
-// to be asked about the rank.
+// What part of the largest compliance the least must be, so that nothing needs to be asked about
+// the rank.
 constexpr double kFullRank = 1e-6;
-// Of a direction of the wrenches that the contacts give, what remains outside
-// of the others: more than the first, it is one of its own, less than the
-// second, it is rounding.
+// Of a direction of the wrenches that the contacts give, what remains outside of the others: more
+// than the first, it is one of its own, less than the second, it is rounding.
 constexpr double kIndependent = 1e-5;
 constexpr double kDependent = 1e-11;
-// The distance from the closest wrench: more than the first, times how far
-// wrench weights are apart, it has digits enough, less than the second, it is
-// rounding.
+// The distance from the closest wrench: more than the first, times how far wrench weights are
+// apart, it has digits enough, less than the second, it is rounding.
 constexpr double kFar = 1e-4;
 constexpr double kReached = 1e-13;
-// What an answer may lack, and until when it is refined out of reach, where
-// what is missing is to be accurate, too.
+// What an answer may lack, and until when it is refined out of reach, where what is missing is to
+// be accurate, too.
 constexpr double kMissing = 1e-12;
 constexpr double kExact = 4e-16;
 constexpr int kRefinements = 3;
-// By how much the signs of an answer may be wrong, beside the terms that make
-// them up.
+// By how much the signs of an answer may be wrong, beside the terms that make them up.
 constexpr double kRounding = 1e-12;
 // Of the distance, a multiplier that is not zero, and one that is.
 constexpr double kHeld = 1e-8;
@@ -128,9 +125,8 @@ void DualNewton::release() {
 //
 //     x_z − g_z − Σ βᵢ max(0, |gᵢ| − βᵢ x_z),
 //
-// rises, ever less steeply: from zero on, where all that pull sideways are at
-// their bounds, Newton's method comes from the left, and lets go of one bound
-// after the other.
+// rises, ever less steeply: from zero on, where all that pull sideways are at their bounds,
+// Newton's method comes from the left, and lets go of one bound after the other.
 void DualNewton::project(Block& block) {
   const int size = block.cone.size;
   const Vector6& g = block.pull;
@@ -183,8 +179,8 @@ DualNewton::Vector6 DualNewton::respond(const Block& block, const Vector6& pull)
   return force;
 }
 
-// The forces for the multipliers at hand, in the state that they want. Returns
-// whether it is another than the former.
+// The forces for the multipliers at hand, in the state that they want. Returns whether it is
+// another than the former.
 bool DualNewton::evaluate() {
   bool changed = false;
   achieved_.setZero();
@@ -209,9 +205,8 @@ void DualNewton::restart(const Vector6& multipliers) {
   correct(multipliers);
 }
 
-// Changes the multipliers in the state at hand. The forces change by what they
-// respond to the change, which is more accurate than what they respond to the
-// sum.
+// Changes the multipliers in the state at hand. The forces change by what they respond to the
+// change, which is more accurate than what they respond to the sum.
 void DualNewton::correct(const Vector6& change) {
   multipliers_ += change;
   achieved_.setZero();
@@ -252,8 +247,8 @@ void DualNewton::assembleCompliance() {
   }
 }
 
-// Newton's method with ε, from the multipliers and the state at hand, until the
-// state stays. Returns false if it does not.
+// Newton's method with ε, from the multipliers and the state at hand, until the state stays.
+// Returns false if it does not.
 bool DualNewton::findState() {
   Vector6 gradient = achieved_ + slack_ * multipliers_ - target_;
   while (iterations_ < kMaximalSteps) {
@@ -265,9 +260,9 @@ bool DualNewton::findState() {
     const Vector6 step = -factors_.solve(gradient);
     const double slope = gradient.dot(step);
     if (!(slope < 0.)) return gradient.norm() <= kMissing;
-    // The slope along the step rises from negative on. The full step is taken
-    // unless the slope is positive there; else one is sought where it has
-    // nearly vanished, or at least the state is another.
+    // The slope along the step rises from negative on. The full step is taken unless the slope is
+    // positive there; else one is sought where it has nearly vanished, or at least the state is
+    // another.
     const Vector6 start = multipliers_;
     for (Block& block : blocks_) block.former = block.state;
     double length = 1., lower = 0., upper = 1., lower_slope = slope, upper_slope = 0.;
@@ -287,8 +282,7 @@ bool DualNewton::findState() {
       }
       (descends ? lower : upper) = length;
       (descends ? lower_slope : upper_slope) = end_slope;
-      // By turns where a straight line between both would vanish, and in the
-      // middle.
+      // By turns where a straight line between both would vanish, and in the middle.
       if (cut % 2 == 0)
         length = lower + (upper - lower) * lower_slope / (lower_slope - upper_slope);
       else
@@ -339,9 +333,8 @@ DualNewton::Vector6 DualNewton::solveRange(const Vector6& wrench) const {
   return range_.leftCols(rank_) * coordinates.head(rank_);
 }
 
-// An orthonormal basis of the wrenches that the state can give, whatever it
-// costs: one direction after the other, of which the most is new. Returns false
-// if the rank is not certain.
+// An orthonormal basis of the wrenches that the state can give, whatever it costs: one direction
+// after the other, of which the most is new. Returns false if the rank is not certain.
 bool DualNewton::findRange() {
   directions_.clear();
   for (const Block& block : blocks_) {
@@ -370,17 +363,17 @@ bool DualNewton::findRange() {
   return true;
 }
 
-// Whether multipliers of both stages have the signs that they must have, and
-// forces are in their cones; sets the bounds of components without extent,
-// which are at both.
+// Whether multipliers of both stages have the signs that they must have, and forces are in their
+// cones; sets the bounds of components without extent, which are at both.
 bool DualNewton::provesItself() {
   const double distance = missing_.norm();
   double all_terms = 0., costs = kRounding;
-  for (const Block& block : blocks_) {
-    for (int i = 0; i < block.cone.size; ++i) {
-      all_terms = std::max(all_terms, termsOf(block, i));
-      costs = std::max(costs, std::abs(block.force[i]));
-    }
+  for (Block& block : blocks_) {
+    // What pulls and forces are made of, without signs.
+    block.terms = block.force.cwiseAbs();
+    block.terms.noalias() += block.e.cwiseAbs().transpose() * multipliers_.cwiseAbs();
+    all_terms = std::max(all_terms, block.terms.maxCoeff());
+    costs = std::max(costs, block.force.cwiseAbs().maxCoeff());
   }
   if (!(all_terms <= kCancellation * costs)) return false;
 
@@ -391,13 +384,13 @@ bool DualNewton::provesItself() {
     // What the normal direction is made of, its size, and what its rounding may be.
     double resistance_of_distance = -p[kNormal], resistance = -g[kNormal];
     double length = distance * block.e.col(kNormal).norm();
-    double rounding = kRounding * termsOf(block, kNormal);
+    double rounding = kRounding * block.terms[kNormal];
     double largest_beta = 1.;
     for (int i = 0; i < block.cone.size; ++i) {
       if (i == kNormal) continue;
       const double beta = block.betas[i], size = std::abs(p[i]);
       const double scale = distance * block.e.col(i).norm();
-      const double own_rounding = kRounding * termsOf(block, i);
+      const double own_rounding = kRounding * block.terms[i];
       if (size > kFree * scale && size < kHeld * scale) return false;
       const bool held = size > kFree * scale;
       signed char& bound = block.state.bounds[static_cast<std::size_t>(i)];
@@ -429,14 +422,8 @@ bool DualNewton::provesItself() {
   return true;
 }
 
-// What the pull and the force of a component are made of, without signs.
-double DualNewton::termsOf(const Block& block, int i) const {
-  return block.e.col(i).cwiseAbs().dot(multipliers_.cwiseAbs()) + std::abs(block.force[i]);
-}
-
-// The closed form for forces without inequalities, if they respect them.
-// Returns false if they do not, or if the contacts hardly give some wrenches;
-// then it has been the first step.
+// The closed form for forces without inequalities, if they respect them. Returns false if they do
+// not, or if the contacts hardly give some wrenches; then it has been the first step.
 bool DualNewton::solveFreely() {
   assembleCompliance();
   factors_.compute(compliance_);

@@ -11,9 +11,8 @@
 
 namespace dynacom::internal {
 
-/// A cone of contact forces that is a box whose size grows with the normal
-/// force: |λᵢ| ≤ βᵢ λ_z for all components but the third, λ_z, and λ_z ≥ 0.
-/// Points and soles are such.
+/// A cone of contact forces that is a box whose size grows with the normal force: |λᵢ| ≤ βᵢ λ_z for
+/// all components but the third, λ_z, and λ_z ≥ 0. Points and soles are such.
 struct BoxCone {
   static constexpr int kNormal = 2;
 
@@ -24,8 +23,7 @@ struct BoxCone {
     std::array<double, 2> factors = {0., 0.};     // of λᵢ there, without sign
   };
 
-  /// The cone A λ ≤ 0 with 3 or 6 components, or nothing if it is of another
-  /// kind.
+  /// The cone A λ ≤ 0 with 3 or 6 components, or nothing if it is of another kind.
   static std::optional<BoxCone> recognise(const Eigen::MatrixXd& A);
 
   int size = 0;
@@ -34,25 +32,22 @@ struct BoxCone {
   double normal_factor = 0.;
 };
 
-/// Both stages of a wrench distribution over contacts whose cones are boxes, by
-/// Newton's method on the dual of
+/// Both stages of a wrench distribution over contacts whose cones are boxes, by Newton's method on
+/// the dual of
 ///
-///     minimise ½ ‖W λ‖² + ½ ‖r‖² / ε   subject to   e λ + r = w,   λ in the
-///     cones
+///     minimise ½ ‖W λ‖² + ½ ‖r‖² / ε   subject to   e λ + r = w,   λ in the cones
 ///
-/// with e = D NE and w weighted by D, both over their units. For the six
-/// multipliers ν = r / ε of the wrench, each contact's forces λ(ν) are the
-/// minimum of ½ ‖W λ‖² − νᵀ e λ in its cone: in closed form, component by
-/// component once λ_z is known, which is the root of a function that rises
-/// along straight lines. The dual's gradient e λ(ν) + ε ν − w is piecewise
-/// linear, so that Newton's method ends at the root as soon as it knows which
-/// components are at their bounds, and which contacts bear a load. From all
-/// that are free on, its first step is the closed form for forces without
-/// inequalities.
+/// with e = D NE and w weighted by D, both over their units. For the six multipliers ν = r / ε of
+/// the wrench, each contact's forces λ(ν) are the minimum of ½ ‖W λ‖² − νᵀ e λ in its cone: in
+/// closed form, component by component once λ_z is known, which is the root of a function that
+/// rises along straight lines. The dual's gradient e λ(ν) + ε ν − w is piecewise linear, so that
+/// Newton's method ends at the root as soon as it knows which components are at their bounds, and
+/// which contacts bear a load. With all components free, its first step is the closed form for
+/// forces without inequalities.
 ///
-/// What is found with ε serves to know that, and no more: the answer follows
-/// from it by linear equations without ε, for both stages, and proves itself.
-/// What does not, and what hangs on the last digits, is left to TwoStageSolver.
+/// What is found with ε serves to know that, and no more: the answer follows from it by linear
+/// equations without ε, for both stages, and proves itself. What does not, and what hangs on the
+/// last digits, is left to TwoStageSolver.
 class DualNewton {
  public:
   using Contact = DistributionResult::Contact;
@@ -65,13 +60,11 @@ class DualNewton {
   /// @param contacts         those of setContacts(), with the NE of now
   /// @param wrench           w over the unit of force, not weighted
   /// @param wrench_weights   D over its overall size
-  /// @return Solved, Relaxed, or NumericalFailure where another solver has to
-  /// be asked
+  /// @return Solved, Relaxed, or NumericalFailure where another solver has to be asked
   DistributionStatus solve(const std::vector<Contact>& contacts, const Vector6& wrench,
                            const Vector6& wrench_weights);
 
-  /// Writes forces and multipliers of solve() into a result with these
-  /// contacts.
+  /// Writes forces and multipliers of solve() into a result with these contacts.
   /// @param unit            newtons in the unit of force
   /// @param overall_weight  the wrench weights over those of solve()
   void writeAnswer(DistributionResult& result, double unit, double overall_weight) const;
@@ -82,8 +75,7 @@ class DualNewton {
  private:
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-  /// Whether a contact bears a load, and which of its components are at which
-  /// bound, ±1.
+  /// Whether a contact bears a load, and which of its components are at which bound, ±1.
   struct State {
     bool loaded = false;
     std::array<signed char, 6> bounds = {};
@@ -93,19 +85,18 @@ class DualNewton {
     }
   };
 
-  /// A contact in units of its cost: its forces are x = W λ, with W the weights
-  /// over the largest.
+  /// A contact in units of its cost: its forces are x = W λ, with W the weights over the largest.
   struct Block {
     BoxCone cone;
     Vector6 weights;  // W
     Vector6 betas;    // of x
     Matrix6 e;        // D NE W⁻¹, and zeros
-    // Of the multipliers at hand: eᵀ ν, x(ν), whether there is a load, and
-    // which components are at which bound.
+    // Of the multipliers at hand: eᵀ ν, x(ν), whether there is a load, and which components are at
+    // which bound.
     Vector6 pull, force;
     State state, former, free;
     double stiffness = 0.;
-    Vector6 pull_of_distance;
+    Vector6 pull_of_distance, terms;  // of provesItself()
   };
 
   void release();
@@ -125,7 +116,6 @@ class DualNewton {
   Vector6 solveRange(const Vector6& wrench) const;
   DistributionStatus finish();
   bool provesItself();
-  double termsOf(const Block& block, int i) const;
 
   std::vector<Block> blocks_;
   bool recognised_ = false;

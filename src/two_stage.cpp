@@ -33,7 +33,7 @@ struct Tolerances {
   // What is left of a vector when others are projected out is none below this part of it.
   static constexpr Scalar kDependent = 1e-10 * kRoundoff<Scalar>;
   // Where the relaxation multiplies an inequality by less than this, it is rounding, too.
-  static constexpr Scalar kMultiplierRounding = kRoundoff<Scalar> < 1 ? kLeastMultiplier : 3e-12;
+  static constexpr Scalar kMultiplierRounding = kRoundoff<Scalar> < 1 ? 1e-14 : 3e-12;
   // Of the relaxation: its √δ, how many steps it may take, when it has arrived, and what does not
   // approach an inequality.
   static constexpr Scalar kProximity = 1e-4 * kRoundoffRoot<Scalar>;

@@ -12,10 +12,9 @@ namespace dynacom::internal {
 // A wrench no farther than this from what the contacts can give, over its own size, is within
 // reach.
 constexpr double kReach = 1e-8;
-// Where the first stage multiplies an inequality by less than this part of the distance, or by less
-// than this, it is rounding.
+// Where the first stage multiplies an inequality by less than this part of the distance, it is
+// rounding.
 constexpr double kMultiplied = 1e-10;
-constexpr double kLeastMultiplier = 1e-14;
 
 /// The two stages of a wrench distribution, robust rather than fast: the reachable wrench closest
 /// to the one that is asked for, then the cheapest forces that give it.
