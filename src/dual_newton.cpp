@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <type_traits>
 
 namespace dynacom::internal {
 
@@ -12,6 +14,8 @@ constexpr int kNormal = BoxCone::kNormal;
 
 // All of these are for a problem whose weighted wrench has unit size.
 
+// How many steps are taken without ε before the one with.
+constexpr int kFreeSteps = 6;
 // ε, as a part of the mean compliance: less, if the answer that it leads to is none.
 constexpr double kSlacks[] = {1e-5, 1e-8, 1e-11};
 constexpr int kMaximalSteps = 50;
@@ -46,7 +50,58 @@ constexpr double kFree = 1e-12;
 // By how much terms may be larger than the costs that they make up.
 constexpr double kCancellation = 1e6;
 
+// Calls a function with an integral_constant for the number of a contact's components, so that the
+// compiler knows it.
+template <class Function>
+void withSize(int size, Function function) {
+  if (size == 6)
+    function(std::integral_constant<int, 6>());
+  else
+    function(std::integral_constant<int, 3>());
+}
+
+// Calls a function with 0, 1, ... 5, which the compiler knows.
+template <class Function, int... Indices>
+void unroll(Function function, std::integer_sequence<int, Indices...>) {
+  (function(std::integral_constant<int, Indices>()), ...);
+}
+template <class Function>
+void unroll6(Function function) {
+  unroll(function, std::make_integer_sequence<int, 6>());
+}
+
 }  // namespace
+
+// Column by column. Segments of vectors begin at an even row, as packets of two do; what they hold
+// above the diagonal is not used.
+void Factors6::compute(const Matrix6& matrix) {
+  Matrix6 rest = matrix;
+  unroll6([&](auto column) {
+    constexpr int j = column, below = 6 - j / 2 * 2;
+    pivots_[j] = rest(j, j);
+    inverse_pivots_[j] = 1. / rest(j, j);
+    L_.col(j).template tail<below>() = rest.col(j).template tail<below>() * inverse_pivots_[j];
+    unroll6([&](auto next_column) {
+      constexpr int k = next_column, segment = 6 - k / 2 * 2;
+      if constexpr (k > j)
+        rest.col(k).template tail<segment>() -= L_.col(j).template tail<segment>() * rest(k, j);
+    });
+  });
+}
+
+Factors6::Vector6 Factors6::solve(const Vector6& rhs) const {
+  Vector6 x = rhs;
+  unroll6([&](auto column) {
+    constexpr int j = column;
+    x.template tail<5 - j>() -= L_.col(j).template tail<5 - j>() * x[j];
+  });
+  x = x.cwiseProduct(inverse_pivots_);
+  unroll6([&](auto step) {
+    constexpr int j = 5 - step;
+    x[j] -= L_.col(j).template tail<5 - j>().dot(x.template tail<5 - j>());
+  });
+  return x;
+}
 
 std::optional<BoxCone> BoxCone::recognise(const Eigen::MatrixXd& A) {
   BoxCone cone;
@@ -84,113 +139,149 @@ std::optional<BoxCone> BoxCone::recognise(const Eigen::MatrixXd& A) {
   return cone;
 }
 
-void DualNewton::setContacts(const std::vector<Contact>& contacts) {
-  blocks_.resize(contacts.size());
+void DualNewton::reserve(std::size_t slots) {
+  if (slots > blocks_.size()) blocks_.resize(slots);
+  active_.reserve(slots);
+  directions_.reserve(6 * slots);
+}
+
+void DualNewton::setContact(std::size_t slot, const Contact& contact) {
+  Block& block = blocks_[slot];
+  const std::optional<BoxCone> cone = BoxCone::recognise(contact.A);
+  block.is_box = cone.has_value();
+  if (!cone) return;
+  block.cone = *cone;
+  block.largest_weight = contact.weights.maxCoeff();
+  block.betas.setZero();
+  block.reaches.setConstant(std::numeric_limits<double>::infinity());
+  block.free = State();
+  block.free.loaded = true;
+  for (int i = 0; i < cone->size; ++i) {
+    const double beta = cone->sides[static_cast<std::size_t>(i)].beta;
+    block.betas[i] = beta * contact.weights[i] / contact.weights[BoxCone::kNormal];
+    if (beta > 0.) block.reaches[i] = block.betas[i];
+    if (i != BoxCone::kNormal && beta == 0.) block.free.bounds[static_cast<std::size_t>(i)] = 1;
+  }
+  block.reaches[BoxCone::kNormal] = 1.;
+  block.e.setZero();
+  enter(block, block.free);
+}
+
+void DualNewton::setActive(const std::vector<std::size_t>& slots,
+                           const std::vector<Contact>& contacts) {
+  active_ = slots;
   recognised_ = true;
   largest_weight_ = 0.;
-  for (const Contact& contact : contacts)
-    largest_weight_ = std::max(largest_weight_, contact.weights.maxCoeff());
-  for (std::size_t k = 0; k < contacts.size(); ++k) {
-    const Contact& contact = contacts[k];
-    const std::optional<BoxCone> cone = BoxCone::recognise(contact.A);
-    if (!cone) {
-      recognised_ = false;
-      return;
-    }
-    Block& block = blocks_[k];
-    block.cone = *cone;
-    block.weights.setOnes();
-    block.weights.head(cone->size) = contact.weights / largest_weight_;
-    for (int i = 0; i < 6; ++i)
-      block.betas[i] =
-          cone->sides[static_cast<std::size_t>(i)].beta * block.weights[i] / block.weights[kNormal];
-    block.free.loaded = true;
-    for (int i = 0; i < cone->size; ++i)
-      block.free.bounds[static_cast<std::size_t>(i)] = i != kNormal && block.betas[i] == 0. ? 1 : 0;
-    block.e.setZero();
-    block.state = block.former = block.free;
+  for (const std::size_t slot : active_) {
+    recognised_ = recognised_ && blocks_[slot].is_box;
+    largest_weight_ = std::max(largest_weight_, blocks_[slot].largest_weight);
   }
-  directions_.reserve(6 * contacts.size());
+  if (!recognised_) return;
+  for (std::size_t k = 0; k < active_.size(); ++k) {
+    Block& block = blocks_[active_[k]];
+    block.weights.setOnes();
+    block.weights.head(block.cone.size) = contacts[k].weights / largest_weight_;
+    block.inverse_weights = block.weights.cwiseInverse();
+  }
 }
 
 // Begins with all components free, but for those that are always zero.
 void DualNewton::release() {
-  for (Block& block : blocks_) {
-    block.state = block.free;
-    computeStiffness(block);
-  }
+  for (const std::size_t slot : active_) enter(blocks_[slot], blocks_[slot].free);
 }
 
-// The state that the pull at hand wants. What x_z would have to be less,
+void DualNewton::enter(Block& block, const State& state) {
+  block.state = state;
+  block.is_free.setZero();
+  block.edge.setZero();
+  block.inverse_stiffness = 0.;
+  if (!state.loaded) return;
+  for (int i = 0; i < block.cone.size; ++i) {
+    const signed char bound = state.bounds[static_cast<std::size_t>(i)];
+    block.is_free[i] = bound == 0 ? 1. : 0.;
+    block.edge[i] = bound * block.betas[i];
+  }
+  block.is_free[kNormal] = 0.;
+  block.edge[kNormal] = 1.;
+  block.inverse_stiffness = 1. / block.edge.squaredNorm();
+}
+
+// The state that a pull wants. What x_z would have to be less,
 //
 //     x_z − g_z − Σ βᵢ max(0, |gᵢ| − βᵢ x_z),
 //
 // rises, ever less steeply: from zero on, where all that pull sideways are at their bounds,
 // Newton's method comes from the left, and lets go of one bound after the other.
-void DualNewton::project(Block& block) {
-  const int size = block.cone.size;
-  const Vector6& g = block.pull;
-  double normal = g[kNormal];
-  bool inside = normal > 0.;
-  for (int i = 0; i < size; ++i)
-    inside &= i == kNormal || std::abs(g[i]) <= block.betas[i] * normal;
-  if (inside) {
-    block.state = block.free;
-    return;
-  }
-
-  double numerator = g[kNormal], denominator = 1.;
-  for (int i = 0; i < size; ++i) {
-    block.state.bounds[i] = 0;
+DualNewton::State DualNewton::findState(const Block& block, const Vector6& pull) {
+  State state;
+  double numerator = pull[kNormal], denominator = 1.;
+  for (int i = 0; i < block.cone.size; ++i) {
     if (i == kNormal) continue;
-    block.state.bounds[i] = g[i] < 0. && block.betas[i] > 0. ? -1 : 1;
-    numerator += block.betas[i] * std::abs(g[i]);
-    denominator += block.betas[i] * block.betas[i];
+    const double beta = block.betas[i];
+    state.bounds[static_cast<std::size_t>(i)] = pull[i] < 0. && beta > 0. ? -1 : 1;
+    numerator += beta * std::abs(pull[i]);
+    denominator += beta * beta;
   }
-  block.state.loaded = numerator > 0.;
-  if (!block.state.loaded) return;
+  state.loaded = numerator > 0.;
+  if (!state.loaded) return state;
   for (bool changed = true; changed;) {
-    normal = numerator / denominator;
+    const double normal = numerator / denominator;
     changed = false;
-    for (int i = 0; i < size; ++i) {
-      if (i == kNormal || block.state.bounds[i] == 0 || block.betas[i] == 0. ||
-          std::abs(g[i]) > block.betas[i] * normal)
-        continue;
-      block.state.bounds[i] = 0;
-      numerator -= block.betas[i] * std::abs(g[i]);
-      denominator -= block.betas[i] * block.betas[i];
+    for (int i = 0; i < block.cone.size; ++i) {
+      const double beta = block.betas[i];
+      signed char& bound = state.bounds[static_cast<std::size_t>(i)];
+      if (i == kNormal || bound == 0 || beta == 0. || std::abs(pull[i]) > beta * normal) continue;
+      bound = 0;
+      numerator -= beta * std::abs(pull[i]);
+      denominator -= beta * beta;
       changed = true;
     }
   }
+  return state;
 }
 
-// The forces for a pull, components at their bounds staying there.
+DualNewton::Vector6 DualNewton::pullOf(const Block& block, const Vector6& multipliers) {
+  Vector6 pull = Vector6::Zero();
+  withSize(block.cone.size, [&](auto size) {
+    pull.template head<size>().noalias() =
+        block.e.template leftCols<size>().transpose() * multipliers;
+  });
+  return pull;
+}
+
+// The forces for a pull, as long as the state stays.
 DualNewton::Vector6 DualNewton::respond(const Block& block, const Vector6& pull) {
-  Vector6 force = Vector6::Zero();
-  if (!block.state.loaded) return force;
-  double numerator = pull[kNormal];
-  for (int i = 0; i < block.cone.size; ++i)
-    numerator += block.state.bounds[i] * block.betas[i] * pull[i];
-  const double normal = numerator / block.stiffness;
-  for (int i = 0; i < block.cone.size; ++i)
-    force[i] =
-        block.state.bounds[i] == 0 ? pull[i] : block.state.bounds[i] * block.betas[i] * normal;
-  force[kNormal] = normal;
-  return force;
+  return block.is_free.cwiseProduct(pull) +
+         (block.edge.dot(pull) * block.inverse_stiffness) * block.edge;
 }
 
-// The forces for the multipliers at hand, in the state that they want. Returns whether it is
-// another than the former.
+void DualNewton::addWrench(const Block& block, const Vector6& force, Vector6& wrench) {
+  withSize(block.cone.size, [&](auto size) {
+    wrench.noalias() += block.e.template leftCols<size>() * force.template head<size>();
+  });
+}
+
+void DualNewton::keepStates() {
+  for (const std::size_t slot : active_) blocks_[slot].former = blocks_[slot].state;
+}
+
+// The forces for the multipliers at hand, in the state that they want. Returns whether that is
+// another than at the last keepStates().
 bool DualNewton::evaluate() {
   bool changed = false;
   achieved_.setZero();
-  for (Block& block : blocks_) {
-    block.pull.noalias() = block.e.transpose() * multipliers_;
-    project(block);
-    computeStiffness(block);
+  for (const std::size_t slot : active_) {
+    Block& block = blocks_[slot];
+    block.pull = pullOf(block, multipliers_);
+    const double normal = block.pull[kNormal];
+    const bool inside =
+        normal > 0. && (block.pull.cwiseAbs() - normal * block.reaches).maxCoeff() <= 0.;
+    const State state = inside ? block.free : findState(block, block.pull);
+    if (state != block.state) enter(block, state);
+    block.state = state;  // where there is no load, too
     block.force = respond(block, block.pull);
-    achieved_.noalias() += block.e * block.force;
-    changed = changed || block.state != block.former;
+    addWrench(block, block.force, achieved_);
+    changed = changed || state != block.former;
   }
   return changed;
 }
@@ -198,9 +289,9 @@ bool DualNewton::evaluate() {
 // Begins anew with multipliers in the state at hand.
 void DualNewton::restart(const Vector6& multipliers) {
   multipliers_.setZero();
-  for (Block& block : blocks_) {
-    block.pull.setZero();
-    block.force.setZero();
+  for (const std::size_t slot : active_) {
+    blocks_[slot].pull.setZero();
+    blocks_[slot].force.setZero();
   }
   correct(multipliers);
 }
@@ -210,48 +301,63 @@ void DualNewton::restart(const Vector6& multipliers) {
 void DualNewton::correct(const Vector6& change) {
   multipliers_ += change;
   achieved_.setZero();
-  for (Block& block : blocks_) {
-    const Vector6 pull = block.e.transpose() * change;
+  for (const std::size_t slot : active_) {
+    Block& block = blocks_[slot];
+    const Vector6 pull = pullOf(block, change);
     block.pull += pull;
     block.force += respond(block, pull);
-    achieved_.noalias() += block.e * block.force;
+    addWrench(block, block.force, achieved_);
   }
 }
 
-// What the normal force and all that goes with it cost.
-void DualNewton::computeStiffness(Block& block) {
-  block.stiffness = 1.;
-  for (int i = 0; i < block.cone.size; ++i)
-    if (block.state.bounds[i] != 0) block.stiffness += block.betas[i] * block.betas[i];
-}
-
-// The direction of wrenches that goes with the normal force.
-DualNewton::Vector6 DualNewton::normalDirection(const Block& block) {
-  Vector6 direction = block.e.col(kNormal);
-  for (int i = 0; i < block.cone.size; ++i)
-    if (block.state.bounds[i] != 0)
-      direction += block.state.bounds[i] * block.betas[i] * block.e.col(i);
-  return direction;
-}
-
-// How the wrench rises with its multipliers, as long as the state stays.
+// How the wrench rises with its multipliers, as long as the state stays: the lower half.
 void DualNewton::assembleCompliance() {
-  compliance_.setZero();
-  for (const Block& block : blocks_) {
+  Matrix6 compliance = Matrix6::Zero();
+  const auto add = [&](const auto& a, const auto& b) {
+    unroll6([&](auto column) {
+      constexpr int j = column, segment = 6 - j / 2 * 2;
+      compliance.col(j).template tail<segment>() += a[j] * b.template tail<segment>();
+    });
+  };
+  for (const std::size_t slot : active_) {
+    const Block& block = blocks_[slot];
     if (!block.state.loaded) continue;
-    const Vector6 direction = normalDirection(block);
-    compliance_.noalias() += direction * (direction / block.stiffness).transpose();
+    Vector6 direction = Vector6::Zero();
+    addWrench(block, block.edge, direction);
+    add(direction, Vector6(direction * block.inverse_stiffness));
     for (int i = 0; i < block.cone.size; ++i)
-      if (block.state.bounds[i] == 0 && i != kNormal)
-        compliance_.noalias() += block.e.col(i) * block.e.col(i).transpose();
+      if (block.is_free[i] != 0.) add(block.e.col(i), block.e.col(i));
   }
+  compliance_ = compliance;
+}
+
+// Steps without ε, from the state at hand, until the wrench is reached. Returns false if it is not,
+// or if the state hardly gives some wrenches.
+bool DualNewton::stepFreely() {
+  rank_ = 6;
+  for (int step = 0; step < kFreeSteps && iterations_ < maximal_iterations_; ++step) {
+    ++iterations_;
+    assembleCompliance();
+    factors_.compute(compliance_);
+    if (!hasFullRank()) {
+      if (step == 0) restart(Vector6::Zero());
+      return false;
+    }
+    multipliers_ = factors_.solve(target_);
+    keepStates();
+    const bool changed = evaluate();
+    if (!changed) refine(target_, kMissing);
+    if (isReached(target_, kMissing)) return isFinite();
+    if (!changed) return false;
+  }
+  return false;
 }
 
 // Newton's method with ε, from the multipliers and the state at hand, until the state stays.
 // Returns false if it does not.
-bool DualNewton::findState() {
+bool DualNewton::stepWithSlack() {
   Vector6 gradient = achieved_ + slack_ * multipliers_ - target_;
-  while (iterations_ < kMaximalSteps) {
+  while (iterations_ < std::min(kMaximalSteps, maximal_iterations_)) {
     ++iterations_;
     assembleCompliance();
     Matrix6 slackened = compliance_;
@@ -264,7 +370,7 @@ bool DualNewton::findState() {
     // positive there; else one is sought where it has nearly vanished, or at least the state is
     // another.
     const Vector6 start = multipliers_;
-    for (Block& block : blocks_) block.former = block.state;
+    keepStates();
     double length = 1., lower = 0., upper = 1., lower_slope = slope, upper_slope = 0.;
     bool changed = false;
     for (int cut = 0;; ++cut) {
@@ -294,11 +400,10 @@ bool DualNewton::findState() {
   return false;
 }
 
-// From the state to the answer, without ε.
+// From the state to the answer, without ε; its compliance has been assembled and decomposed.
 DistributionStatus DualNewton::finish() {
   missing_.setZero();
   rank_ = 6;
-  factors_.compute(compliance_);
   if (!hasFullRank() && !findRange()) return DistributionStatus::NumericalFailure;
 
   if (rank_ < 6) {
@@ -312,14 +417,15 @@ DistributionStatus DualNewton::finish() {
     else if (distance < kFar * weights_.maxCoeff() / weights_.minCoeff())
       return DistributionStatus::NumericalFailure;
     Matrix6 reduced = Matrix6::Identity();
-    reduced.topLeftCorner(rank_, rank_).noalias() = range.transpose() * compliance_ * range;
+    reduced.topLeftCorner(rank_, rank_).noalias() =
+        range.transpose() * compliance_.selfadjointView<Eigen::Lower>() * range;
     factors_.compute(reduced);
     restart(range * (range.transpose() * multipliers_));
   }
   const Vector6 closest = target_ - missing_;
   const bool reached = missing_.isZero(0.);
   refine(closest, reached ? kMissing : kExact);
-  if (!((closest - achieved_).norm() <= kMissing) || !provesItself())
+  if (!isReached(closest, kMissing) || !provesItself() || !isFinite())
     return DistributionStatus::NumericalFailure;
   return reached ? DistributionStatus::Solved : DistributionStatus::Relaxed;
 }
@@ -329,7 +435,7 @@ DualNewton::Vector6 DualNewton::solveRange(const Vector6& wrench) const {
   if (rank_ == 6) return factors_.solve(wrench);
   Vector6 coordinates = Vector6::Zero();
   coordinates.head(rank_).noalias() = range_.leftCols(rank_).transpose() * wrench;
-  factors_.solveInPlace(coordinates);
+  coordinates = factors_.solve(coordinates);
   return range_.leftCols(rank_) * coordinates.head(rank_);
 }
 
@@ -337,12 +443,14 @@ DualNewton::Vector6 DualNewton::solveRange(const Vector6& wrench) const {
 // after the other, of which the most is new. Returns false if the rank is not certain.
 bool DualNewton::findRange() {
   directions_.clear();
-  for (const Block& block : blocks_) {
+  for (const std::size_t slot : active_) {
+    const Block& block = blocks_[slot];
     if (!block.state.loaded) continue;
-    directions_.push_back(normalDirection(block).normalized());
+    Vector6 direction = Vector6::Zero();
+    addWrench(block, block.edge, direction);
+    directions_.push_back(direction.normalized());
     for (int i = 0; i < block.cone.size; ++i)
-      if (block.state.bounds[i] == 0 && i != kNormal)
-        directions_.push_back(block.e.col(i).normalized());
+      if (block.is_free[i] != 0.) directions_.push_back(block.e.col(i).normalized());
   }
   for (rank_ = 0; rank_ < 6; ++rank_) {
     double most = 0.;
@@ -368,7 +476,8 @@ bool DualNewton::findRange() {
 bool DualNewton::provesItself() {
   const double distance = missing_.norm();
   double all_terms = 0., costs = kRounding;
-  for (Block& block : blocks_) {
+  for (const std::size_t slot : active_) {
+    Block& block = blocks_[slot];
     // What pulls and forces are made of, without signs.
     block.terms = block.force.cwiseAbs();
     block.terms.noalias() += block.e.cwiseAbs().transpose() * multipliers_.cwiseAbs();
@@ -377,8 +486,9 @@ bool DualNewton::provesItself() {
   }
   if (!(all_terms <= kCancellation * costs)) return false;
 
-  for (Block& block : blocks_) {
-    block.pull_of_distance.noalias() = block.e.transpose() * missing_;
+  for (const std::size_t slot : active_) {
+    Block& block = blocks_[slot];
+    block.pull_of_distance = pullOf(block, missing_);
     const Vector6& p = block.pull_of_distance;
     const Vector6& g = block.pull;
     // What the normal direction is made of, its size, and what its rounding may be.
@@ -422,62 +532,74 @@ bool DualNewton::provesItself() {
   return true;
 }
 
-// The closed form for forces without inequalities, if they respect them. Returns false if they do
-// not, or if the contacts hardly give some wrenches; then it has been the first step.
-bool DualNewton::solveFreely() {
-  assembleCompliance();
-  factors_.compute(compliance_);
-  if (!hasFullRank()) return false;
-  ++iterations_;
-  rank_ = 6;
-  missing_.setZero();
-  multipliers_ = factors_.solve(target_);
-  for (Block& block : blocks_) block.former = block.state;
-  if (evaluate()) return false;
-  refine(target_, kMissing);
-  for (Block& block : blocks_) {
-    block.pull_of_distance.setZero();
-    for (int i = 0; i < block.cone.size; ++i)
-      if (block.state.bounds[i] != 0) block.state.bounds[i] = block.pull[i] < 0. ? -1 : 1;
-  }
-  return (target_ - achieved_).norm() <= kMissing;
+bool DualNewton::hasFullRank() const {
+  const Vector6& pivots = factors_.pivots();
+  return (pivots.array() > kFullRank * pivots.maxCoeff()).all();
 }
 
-bool DualNewton::hasFullRank() const {
-  const auto pivots = factors_.matrixLLT().diagonal();
-  const double least = pivots.minCoeff(), largest = pivots.maxCoeff();
-  return factors_.info() == Eigen::Success && least * least > kFullRank * largest * largest;
+bool DualNewton::isReached(const Vector6& wrench, double enough) const {
+  return (wrench - achieved_).squaredNorm() <= enough * enough;
 }
 
 // Corrects the multipliers until no more than this is lacking of a wrench.
 void DualNewton::refine(const Vector6& wrench, double enough) {
-  for (int refinement = 0; refinement < kRefinements; ++refinement) {
-    const Vector6 lacking = wrench - achieved_;
-    if (lacking.norm() <= enough) return;
-    correct(solveRange(lacking));
-  }
+  for (int refinement = 0; refinement < kRefinements && !isReached(wrench, enough); ++refinement)
+    correct(solveRange(wrench - achieved_));
+}
+
+// Whether the contacts' matrices are finite: whatever of them is not, the pulls are not.
+bool DualNewton::isFinite() const {
+  double sum = 0.;
+  for (const std::size_t slot : active_) sum += blocks_[slot].pull.cwiseAbs().sum();
+  return std::isfinite(sum);
 }
 
 DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const Vector6& wrench,
-                                     const Vector6& wrench_weights) {
+                                     const Vector6& wrench_weights, bool warm_start,
+                                     int maximal_iterations) {
   iterations_ = 0;
+  maximal_iterations_ = maximal_iterations;
   if (!recognised_) return DistributionStatus::NumericalFailure;
   weights_ = wrench_weights;
   target_ = weights_.cwiseProduct(wrench);
-  for (std::size_t k = 0; k < blocks_.size(); ++k) {
-    Block& block = blocks_[k];
-    for (int i = 0; i < block.cone.size; ++i)
-      block.e.col(i) = weights_.cwiseProduct(contacts[k].NE.col(i)) / block.weights[i];
+  for (std::size_t k = 0; k < active_.size(); ++k) {
+    Block& block = blocks_[active_[k]];
+    withSize(block.cone.size, [&](auto size) {
+      const Eigen::Map<const Eigen::Matrix<double, 6, size>> NE(contacts[k].NE.data());
+      for (int i = 0; i < size; ++i)
+        block.e.col(i) = weights_.cwiseProduct(NE.col(i)) * block.inverse_weights[i];
+    });
   }
 
-  release();
-  restart(Vector6::Zero());
-  if (solveFreely()) return DistributionStatus::Solved;
-  const double mean_compliance = compliance_.trace() / 6.;
+  const DistributionStatus status = search(warm_start && has_state_);
+  has_state_ = status != DistributionStatus::NumericalFailure;
+  return status;
+}
+
+DistributionStatus DualNewton::search(bool from_last_state) {
+  if (!from_last_state) release();
+  bool reached = stepFreely();
+  if (!reached && from_last_state && iterations_ == 1 && !hasFullRank()) {
+    // The last wrench was out of reach: if this one is, too, the state leads to the answer.
+    const DistributionStatus status = finish();
+    if (status != DistributionStatus::NumericalFailure) return status;
+    release();
+    reached = stepFreely();
+  }
+  if (reached) {
+    missing_.setZero();
+    settle();
+    return DistributionStatus::Solved;
+  }
+
+  double mean_compliance = 0.;
+  for (const std::size_t slot : active_) mean_compliance += blocks_[slot].e.squaredNorm() / 6.;
   for (const double slack : kSlacks) {
     slack_ = slack * mean_compliance;
-    if (!findState()) break;
+    if (!stepWithSlack()) break;
     const Vector6 multipliers = multipliers_;
+    assembleCompliance();
+    factors_.compute(compliance_);
     const DistributionStatus status = finish();
     if (status != DistributionStatus::NumericalFailure) return status;
     multipliers_ = multipliers;
@@ -486,15 +608,32 @@ DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const
   return DistributionStatus::NumericalFailure;
 }
 
+// Of an answer within reach, what provesItself() sets: components without extent are at both
+// bounds.
+void DualNewton::settle() {
+  for (const std::size_t slot : active_) {
+    Block& block = blocks_[slot];
+    block.pull_of_distance.setZero();
+    for (int i = 0; i < block.cone.size; ++i)
+      if (block.betas[i] == 0. && i != kNormal)
+        block.state.bounds[static_cast<std::size_t>(i)] = block.pull[i] < 0. ? -1 : 1;
+  }
+}
+
 void DualNewton::writeAnswer(DistributionResult& result, double unit, double overall_weight) const {
   const double cost_scale = unit * largest_weight_ * largest_weight_;
   const double distance_scale = unit * overall_weight * overall_weight;
   result.wrench_multipliers = cost_scale * weights_.cwiseProduct(multipliers_);
-  for (std::size_t k = 0; k < blocks_.size(); ++k) {
-    const Block& block = blocks_[k];
+  result.achieved = unit * achieved_.cwiseQuotient(weights_);
+  result.residual = result.wrench - result.achieved;
+  double cost = 0.;
+  for (std::size_t k = 0; k < active_.size(); ++k) {
+    const Block& block = blocks_[active_[k]];
     const int size = block.cone.size;
     Contact& contact = result.contacts[k];
-    contact.force = unit * block.force.head(size).cwiseQuotient(block.weights.head(size));
+    const Vector6 force = unit * block.force.cwiseProduct(block.inverse_weights);
+    contact.force = force.head(size);
+    cost += block.force.squaredNorm();
     contact.multipliers.setZero();
     contact.relaxation_multipliers.setZero();
     contact.active.setConstant(false);
@@ -523,6 +662,7 @@ void DualNewton::writeAnswer(DistributionResult& result, double unit, double ove
       write(block.cone.normal_row, block.weights[kNormal] / block.cone.normal_factor, of_normal,
             of_distance);
   }
+  result.cost = 0.5 * unit * cost_scale * cost;
 }
 
 }  // namespace dynacom::internal

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <array>
 #include <optional>
@@ -32,6 +31,24 @@ struct BoxCone {
   double normal_factor = 0.;
 };
 
+/// L D Lᵀ of a symmetric positive matrix, of which the lower half is read. Without square roots,
+/// and with sizes that the compiler knows, it takes half the time of Eigen's Cholesky
+/// decompositions.
+class Factors6 {
+ public:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+  void compute(const Matrix6& matrix);
+  Vector6 solve(const Vector6& rhs) const;
+  /// The diagonal of D: not positive where the matrix is not.
+  const Vector6& pivots() const { return pivots_; }
+
+ private:
+  Matrix6 L_ = Matrix6::Identity();
+  Vector6 pivots_ = Vector6::Ones(), inverse_pivots_ = Vector6::Ones();
+};
+
 /// Both stages of a wrench distribution over contacts whose cones are boxes, by Newton's method on
 /// the dual of
 ///
@@ -41,30 +58,43 @@ struct BoxCone {
 /// the wrench, each contact's forces λ(ν) are the minimum of ½ ‖W λ‖² − νᵀ e λ in its cone: in
 /// closed form, component by component once λ_z is known, which is the root of a function that
 /// rises along straight lines. The dual's gradient e λ(ν) + ε ν − w is piecewise linear, so that
-/// Newton's method ends at the root as soon as it knows which components are at their bounds, and
-/// which contacts bear a load. With all components free, its first step is the closed form for
-/// forces without inequalities.
+/// Newton's method ends at the root as soon as it knows the state of the contacts: which components
+/// are at their bounds, and which contacts bear a load.
 ///
-/// What is found with ε serves to know that, and no more: the answer follows from it by linear
-/// equations without ε, for both stages, and proves itself. What does not, and what hangs on the
-/// last digits, is left to TwoStageSolver.
+/// It starts from the state of the last answer, or from none at their bounds, where its first step
+/// is the closed form for forces without inequalities. At first there is no ε: as long as the state
+/// can give all wrenches, a step leads to the multipliers that would be the answer if the state
+/// stayed. Where that does not end, ε > 0 makes steps whose length can be chosen so that the dual
+/// falls. What is found with ε serves to know the state, and no more: the answer follows from it by
+/// linear equations without ε, for both stages, and proves itself. What does not, and what hangs on
+/// the last digits, is left to TwoStageSolver.
+///
+/// Contacts are known by slot. Nothing is allocated but by reserve().
 class DualNewton {
  public:
   using Contact = DistributionResult::Contact;
   using Vector6 = DistributionResult::Vector6;
 
-  /// Takes the contacts' inequalities and weights.
-  void setContacts(const std::vector<Contact>& contacts);
+  /// Gets the storage for this many slots.
+  void reserve(std::size_t slots);
+
+  /// Takes the inequalities and weights of a slot's contact, of whose state nothing is known then.
+  void setContact(std::size_t slot, const Contact& contact);
+
+  /// Says whose contacts take part from now on, in this order.
+  void setActive(const std::vector<std::size_t>& slots, const std::vector<Contact>& contacts);
 
   /// Finds the forces.
-  /// @param contacts         those of setContacts(), with the NE of now
-  /// @param wrench           w over the unit of force, not weighted
-  /// @param wrench_weights   D over its overall size
+  /// @param contacts            those that take part, with the NE of now
+  /// @param wrench              w over the unit of force, not weighted
+  /// @param wrench_weights      D over its overall size
+  /// @param warm_start          whether to start from the state of the last answer
+  /// @param maximal_iterations  after how many to give up
   /// @return Solved, Relaxed, or NumericalFailure where another solver has to be asked
   DistributionStatus solve(const std::vector<Contact>& contacts, const Vector6& wrench,
-                           const Vector6& wrench_weights);
+                           const Vector6& wrench_weights, bool warm_start, int maximal_iterations);
 
-  /// Writes forces and multipliers of solve() into a result with these contacts.
+  /// Writes forces, multipliers and what they amount to into a result with these contacts.
   /// @param unit            newtons in the unit of force
   /// @param overall_weight  the wrench weights over those of solve()
   void writeAnswer(DistributionResult& result, double unit, double overall_weight) const;
@@ -73,7 +103,7 @@ class DualNewton {
   int iterations() const { return iterations_; }
 
  private:
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  using Matrix6 = Factors6::Matrix6;
 
   /// Whether a contact bears a load, and which of its components are at which bound, ±1.
   struct State {
@@ -86,50 +116,66 @@ class DualNewton {
   };
 
   /// A contact in units of its cost: its forces are x = W λ, with W the weights over the largest.
+  /// What a point does not have is zero.
   struct Block {
     BoxCone cone;
-    Vector6 weights;  // W
-    Vector6 betas;    // of x
-    Matrix6 e;        // D NE W⁻¹, and zeros
-    // Of the multipliers at hand: eᵀ ν, x(ν), whether there is a load, and which components are at
-    // which bound.
+    bool is_box;
+    double largest_weight;             // of the contact
+    Vector6 weights, inverse_weights;  // W
+    Vector6 betas;                     // of x
+    Vector6 reaches;                   // by which components are free; ∞ without extent
+    Matrix6 e;                         // D NE W⁻¹
+    // The state with no component at its bound, but for those without extent, and that at hand.
+    State free, state, former;
+    // In this state, forces that respond to a pull are its projection on the free components, and
+    // on the direction in which those at their bounds go with the normal force.
+    Vector6 is_free, edge;
+    double inverse_stiffness;  // 1 / ‖edge‖²
+    // Of the multipliers at hand: eᵀ ν, x(ν).
     Vector6 pull, force;
-    State state, former, free;
-    double stiffness = 0.;
-    Vector6 pull_of_distance, terms;  // of provesItself()
+    // Of provesItself().
+    Vector6 pull_of_distance, terms;
   };
 
-  void release();
-  static void project(Block& block);
-  static void computeStiffness(Block& block);
+  static void enter(Block& block, const State& state);
+  static State findState(const Block& block, const Vector6& pull);
   static Vector6 respond(const Block& block, const Vector6& pull);
-  static Vector6 normalDirection(const Block& block);
+  static Vector6 pullOf(const Block& block, const Vector6& multipliers);
+  static void addWrench(const Block& block, const Vector6& force, Vector6& wrench);
+  void release();
+  void keepStates();
   bool evaluate();
   void restart(const Vector6& multipliers);
   void correct(const Vector6& change);
   void assembleCompliance();
-  bool solveFreely();
   bool hasFullRank() const;
+  bool isReached(const Vector6& wrench, double enough) const;
   void refine(const Vector6& wrench, double enough);
-  bool findState();
+  bool isFinite() const;
+  bool stepFreely();
+  bool stepWithSlack();
+  DistributionStatus search(bool from_last_state);
+  void settle();
   bool findRange();
   Vector6 solveRange(const Vector6& wrench) const;
   DistributionStatus finish();
   bool provesItself();
 
-  std::vector<Block> blocks_;
-  bool recognised_ = false;
-  double largest_weight_ = 0.;
+  std::vector<Block> blocks_;        // by slot
+  std::vector<std::size_t> active_;  // slots
+  bool recognised_ = false;          // whether all active cones are boxes
+  bool has_state_ = false;           // whether the states are those of an answer
+  double largest_weight_ = 0.;       // of the active contacts
   Vector6 weights_ = Vector6::Ones(), target_ = Vector6::Zero();
   Vector6 multipliers_ = Vector6::Zero(), achieved_ = Vector6::Zero();
   Vector6 missing_ = Vector6::Zero();  // of the closest wrench
   double slack_ = 0.;                  // ε
   Matrix6 compliance_ = Matrix6::Zero();
-  Eigen::LLT<Matrix6> factors_;
+  Factors6 factors_;
   int rank_ = 6;
   Matrix6 range_ = Matrix6::Zero();
   std::vector<Vector6> directions_;
-  int iterations_ = 0;
+  int iterations_ = 0, maximal_iterations_ = 0;
 };
 
 }  // namespace dynacom::internal

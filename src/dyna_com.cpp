@@ -21,6 +21,8 @@ namespace {
 
 // Turns a mass into the force that distributions are compared with, whatever gravity is [m/s²].
 constexpr double kStandardGravity = 9.81;
+// By what part sums of the same masses may differ.
+constexpr double kSameMass = 1e-9;
 
 // The index of a contact's frame. Frames of different types may share a name: that says too little.
 pinocchio::FrameIndex findFrame(const pinocchio::Model& model, const std::string& frame_name,
@@ -63,11 +65,15 @@ std::ostream& operator<<(std::ostream& out, const DynaCoMSettings& settings) {
              << settings.gravity.transpose() << "])";
 }
 
-DynaCoM::Entry::Entry(std::string name, std::shared_ptr<ContactBase> contact, bool active)
-    : name(std::move(name)), contact(std::move(contact)), active(active) {}
+DynaCoM::Entry::Entry(std::string name, std::shared_ptr<ContactBase> contact, std::size_t slot)
+    : name(std::move(name)), contact(std::move(contact)), slot(slot) {}
 
 DynaCoM::Entry::Entry(const Entry& other)
-    : Entry(other.name, other.contact->clone(), other.active) {}
+    : name(other.name),
+      contact(other.contact->clone()),
+      slot(other.slot),
+      active(other.active),
+      measured(other.measured) {}
 
 DynaCoM::Entry& DynaCoM::Entry::operator=(const Entry& other) { return *this = Entry(other); }
 
@@ -111,9 +117,7 @@ void DynaCoM::forgetMotion() {
   ext_wrench_.setConstant(kNaN);
   feasible_ = pressing_ = state_;
   cop_ = vrp_ = nl_ = nan.head<2>();
-  WrenchDistribution unsolved;
-  unsolved.setWrenchWeights(getWrenchWeights());
-  distribution_ = std::move(unsolved);
+  distribution_.reset();
 }
 
 void DynaCoM::requireInitialized() const {
@@ -137,12 +141,36 @@ void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const Vect
                               const Vector6& extWrench, bool flatHorizontalGround) {
   requireInitialized();
   updateFrames();
-  state_ = computeCentroidalState(model_, data_, q, v, a);
+  const CentroidalState state = computeCentroidalState(model_, data_, q, v, a);
+  const bool finite = q.allFinite() && v.allFinite() && a.allFinite();
+  takeMotion(state, finite, extWrench, flatHorizontalGround);
+}
+
+void DynaCoM::computeDynamics(const pinocchio::Data& data, const Vector6& extWrench,
+                              bool flatHorizontalGround) {
+  requireInitialized();
+  internal::requireSize("data.oMi", Eigen::Index(data.oMi.size()), Eigen::Index(model_.njoints),
+                        "placements (one per joint)");
+  const CentroidalState state = readCentroidalState(data);
+  if (!(std::abs(state.mass - mass_) <= kSameMass * mass_))
+    throw NotReadyError(internal::concat(
+        "DynaCoM::computeDynamics(data) needs computeCentroidalMomentumTimeVariation(model, data, "
+        "q, v, a) before: data's mass must be ",
+        mass_, " kg, got ", state.mass));
+  updateFrames();
+  data_.oMi = data.oMi;
+  takeMotion(state, true, extWrench, flatHorizontalGround);
+}
+
+// What follows from a state, be it finite or not; if what it was computed from is not finite, it is
+// not to be trusted either.
+void DynaCoM::takeMotion(const CentroidalState& state, bool finite, const Vector6& extWrench,
+                         bool flatHorizontalGround) {
+  state_ = state;
   ext_wrench_ = extWrench;
   ground_wrench_ = computeGroundWrench(state_, settings_.gravity, ext_wrench_);
-  const bool known = q.allFinite() && v.allFinite() && a.allFinite() && extWrench.allFinite() &&
-                     isFinite(state_) && ground_wrench_.force.allFinite() &&
-                     ground_wrench_.torque.allFinite();
+  const bool known = finite && extWrench.allFinite() && isFinite(state_) &&
+                     ground_wrench_.force.allFinite() && ground_wrench_.torque.allFinite();
   if (!known) {
     // There is a motion, of which nothing is known: not even what happens to be finite.
     state_ = unknownState(mass_);
@@ -150,7 +178,7 @@ void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const Vect
     ext_wrench_.setConstant(kNaN);
     ground_wrench_ = computeGroundWrench(state_, settings_.gravity, ext_wrench_);
   }
-  for (const Entry& entry : contacts_) place(*entry.contact, state_.com);
+  for (const Entry& entry : contacts_) place(entry, state_.com);
 
   feasible_ = unknownState(mass_);
   pressing_ = state_;
@@ -191,11 +219,21 @@ void DynaCoM::addContact(const std::shared_ptr<ContactBase>& contact, const std:
   updateFrames();
   // Whatever index the contact holds may be another model's.
   const pinocchio::FrameIndex frame_id = findFrame(model_, contact->getFrameName(), name);
-  contacts_.emplace_back(name, contact, false);
+  const std::size_t slot = findFreeSlot();
+  distribution_.reserve(*contact, slot);
+  contacts_.emplace_back(name, contact, slot);
   contact->setFrameID(frame_id);
   contact->deactivate();
-  if (hasMotion()) place(*contact, state_.com);
+  if (hasMotion()) place(contacts_.back(), state_.com);
   if (active) activateContact(name);
+}
+
+// The first slot that no contact has.
+std::size_t DynaCoM::findFreeSlot() const {
+  for (std::size_t slot = 0;; ++slot)
+    if (std::none_of(contacts_.begin(), contacts_.end(),
+                     [&](const Entry& entry) { return entry.slot == slot; }))
+      return slot;
 }
 
 void DynaCoM::removeContact(const std::string& name) {
@@ -209,7 +247,7 @@ void DynaCoM::activateContact(const std::string& name) {
   const auto entry = find(name);
   if (entry->active) return;
   updateFrames();
-  if (hasMotion()) place(*entry->contact, state_.com);
+  if (hasMotion()) place(*entry, state_.com);
   const auto end_of_active = firstInactive();
   entry->active = true;
   distribution_.forgetForces();
@@ -256,15 +294,29 @@ void DynaCoM::updateFrames() {
   }
 }
 
-// Places a contact where its frame is. By oMi, which every kinematic algorithm of Pinocchio leaves
-// in data.
-void DynaCoM::place(ContactBase& contact, const Eigen::Vector3d& com) {
+// Places a contact where its frame is: where it was measured, or by oMi, which every kinematic
+// algorithm of Pinocchio leaves in data.
+void DynaCoM::place(const Entry& entry, const Eigen::Vector3d& com) {
+  ContactBase& contact = *entry.contact;
+  if (entry.measured) {
+    contact.updateNewtonEuler(com, contact.getPose());
+    return;
+  }
   // Frames may have been added to the model behind a reference to it, which data does not know.
   if (data_.oMf.size() < model_.frames.size())
     data_.oMf.resize(model_.frames.size(), pinocchio::SE3::Identity());
   contact.updateNewtonEuler(com,
                             pinocchio::updateFramePlacement(model_, data_, contact.getFrameID()));
 }
+
+void DynaCoM::setContactPose(const std::string& name, const pinocchio::SE3& oMs) {
+  const auto entry = find(name);
+  entry->measured = true;
+  entry->contact->setPose(oMs);
+  if (hasMotion()) place(*entry, state_.com);
+}
+
+void DynaCoM::resetContactPose(const std::string& name) { find(name)->measured = false; }
 
 const std::shared_ptr<ContactBase>& DynaCoM::getContact(const std::string& name) const {
   return find(name)->contact;
@@ -291,8 +343,8 @@ DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForc
   distribution_.clear();
   for (const Entry& entry : contacts_) {
     if (!entry.active) break;
-    place(*entry.contact, com);
-    distribution_.add(*entry.contact);
+    place(entry, com);
+    distribution_.add(*entry.contact, entry.slot);
   }
   Vector6 wrench;
   wrench << groundCoMForce, groundCoMTorque;

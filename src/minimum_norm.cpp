@@ -2,6 +2,7 @@
 #include "minimum_norm.hpp"
 
 #include <Eigen/Jacobi>
+#include <Eigen/QR>
 #include <algorithm>
 #include <limits>
 
@@ -27,10 +28,10 @@ int iterationLimit(Eigen::Index inequalities) { return 50 + 10 * static_cast<int
 
 template <class Scalar>
 void MinimumNorm<Scalar>::reserve(Eigen::Index n, Eigen::Index p, Eigen::Index m) {
-  if (qr_.rows() != n || qr_.cols() != p) qr_ = Eigen::ColPivHouseholderQR<Matrix>(n, p);
+  reflectors_.resize(n, p);
   J_.resize(n, n);
   R_.resize(n, n);
-  for (Vector* vector : {&rhs_, &x_, &u_, &Jn_, &r_, &workspace_}) vector->resize(n);
+  for (KeptVector* vector : {&rhs_, &x_, &u_, &Jn_, &r_, &workspace_}) vector->resize(n);
   y_.resize(p);
   z_.resize(m);
   slack_.resize(m);
@@ -41,12 +42,12 @@ void MinimumNorm<Scalar>::reserve(Eigen::Index n, Eigen::Index p, Eigen::Index m
 template <class Scalar>
 typename MinimumNorm<Scalar>::Status MinimumNorm<Scalar>::solve(
     const MatrixRef& E, const VectorRef& d, const MatrixRef& G, const VectorRef& h,
-    Scalar tolerance, Scalar dependent) {
+    Scalar tolerance, Scalar dependent, int maximal_iterations) {
   iterations_ = 0;
   reserve(E.rows(), E.cols(), G.cols());
   implied_.clear();
   startWithEqualities(E, d);
-  const Status status = activateViolated(G, h, tolerance, dependent);
+  const Status status = activateViolated(G, h, tolerance, dependent, maximal_iterations);
   readMultipliers();
   return status;
 }
@@ -55,7 +56,9 @@ template <class Scalar>
 typename MinimumNorm<Scalar>::Status MinimumNorm<Scalar>::activateViolated(const MatrixRef& G,
                                                                            const VectorRef& h,
                                                                            Scalar tolerance,
-                                                                           Scalar dependent) {
+                                                                           Scalar dependent,
+                                                                           int maximal_iterations) {
+  const int limit = std::min(maximal_iterations, iterationLimit(G.cols()));
   for (bool refined = true;;) {
     const Eigen::Index violated = findViolated(G, h, tolerance);
     if (violated < 0) {
@@ -70,7 +73,7 @@ typename MinimumNorm<Scalar>::Status MinimumNorm<Scalar>::activateViolated(const
 
     Scalar multiplier = 0.;
     for (bool done = false; !done;) {
-      if (iterations_ == iterationLimit(G.cols())) return Status::IterationLimit;
+      if (iterations_ >= limit) return Status::IterationLimit;
       ++iterations_;
       computeDirections(G.col(violated));
       // The whole step reaches the inequality; on the way, the multiplier of an active one may
@@ -120,13 +123,20 @@ void MinimumNorm<Scalar>::startWithEqualities(const MatrixRef& E, const VectorRe
 
   q_ = equalities_ = 0;
   if (E.cols() > 0) {  // Eigen's decomposition wants one
-    qr_.compute(E);
+    reflectors_ = E;
+    using Reflectors = typename decltype(reflectors_)::PlainObject;
+    Eigen::ColPivHouseholderQR<Eigen::Ref<Reflectors>> qr(reflectors_);  // in place
     // Eigen's threshold is relative to the largest pivot, which may be nothing but rounding.
-    qr_.setThreshold(kDependentEquality<Scalar> /
-                     std::max(qr_.maxPivot(), kDependentEquality<Scalar>));
-    q_ = equalities_ = qr_.rank();
-    R_.topLeftCorner(q_, q_) = qr_.matrixQR().topLeftCorner(q_, q_);
-    for (Eigen::Index k = 0; k < q_; ++k) rhs_[k] = d[qr_.colsPermutation().indices()[k]];
+    qr.setThreshold(kDependentEquality<Scalar> /
+                    std::max(qr.maxPivot(), kDependentEquality<Scalar>));
+    q_ = equalities_ = qr.rank();
+    R_.topLeftCorner(q_, q_) = reflectors_.topLeftCorner(q_, q_);
+    for (Eigen::Index k = 0; k < q_; ++k) {
+      const auto position = static_cast<std::size_t>(k);
+      coefficients_[position] = qr.hCoeffs()[k];
+      permutation_[position] = qr.colsPermutation().indices()[k];
+      rhs_[k] = d[permutation_[position]];
+    }
   }
 
   // As computeSolution(), but without J.
@@ -155,10 +165,10 @@ void MinimumNorm<Scalar>::applyQ(Operand& operand) {
   auto products = workspace_.head(operand.cols()).transpose();
   for (Eigen::Index k = equalities_ - 1; k >= 0; --k) {
     const Eigen::Index below = operand.rows() - k - 1;
-    const auto reflector = qr_.matrixQR().col(k).tail(below);
+    const auto reflector = reflectors_.col(k).tail(below);
     products = operand.row(k);
     products.noalias() += reflector.transpose() * operand.bottomRows(below);
-    products *= qr_.hCoeffs()[k];
+    products *= coefficients_[static_cast<std::size_t>(k)];
     operand.row(k) -= products;
     operand.bottomRows(below) -= reflector.lazyProduct(products);
   }
@@ -236,7 +246,8 @@ void MinimumNorm<Scalar>::computeSolution() {
 template <class Scalar>
 void MinimumNorm<Scalar>::readMultipliers() {
   y_.setZero();
-  for (Eigen::Index k = 0; k < equalities_; ++k) y_[qr_.colsPermutation().indices()[k]] = u_[k];
+  for (Eigen::Index k = 0; k < equalities_; ++k)
+    y_[permutation_[static_cast<std::size_t>(k)]] = u_[k];
   z_.setZero();
   for (Eigen::Index k = equalities_; k < q_; ++k) z_[active_[k - equalities_]] = u_[k];
 }

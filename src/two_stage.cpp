@@ -73,13 +73,26 @@ void TwoStageSolver<Scalar>::setProblem(const std::vector<DistributionResult::Co
     m_ += contact.A.rows();
     largest_weight_ = std::max(largest_weight_, contact.weights.maxCoeff());
   }
-  reserve();
+  resize();
 }
 
-// Gets the storage for what this problem does not need, but the next one of its sizes may.
 template <class Scalar>
-void TwoStageSolver<Scalar>::reserve() {
-  if (scaled_.size() == n_ && relaxation_multipliers_.size() == m_) return;
+void TwoStageSolver<Scalar>::reserve(std::size_t contacts, Eigen::Index rows, Eigen::Index cols,
+                                     Eigen::Index all_rows, Eigen::Index all_cols) {
+  contacts_.resize(contacts);
+  for (std::size_t k = 0; k < contacts; ++k) {
+    contacts_[k].A.resize(rows, cols);
+    contacts_[k].weights.resize(cols);
+    contacts_[k].NE.resize(6, cols);
+  }
+  n_ = all_cols;
+  m_ = all_rows;
+  resize();
+}
+
+// Gives everything the size of the problem, also what it may not need.
+template <class Scalar>
+void TwoStageSolver<Scalar>::resize() {
   for (Program* program : {&direct_, &slackened_}) {
     const Eigen::Index slacks = program == &slackened_ ? 6 : 0;
     program->scales.resize(n_);
@@ -89,8 +102,9 @@ void TwoStageSolver<Scalar>::reserve() {
     program->h.resize(m_);
     program->solver.reserve(slacks + n_, 6, m_);
   }
-  for (Vector* vector : {&lambda_, &scaled_, &change_, &gradient_, &products_}) vector->resize(n_);
-  for (Vector* vector : {&relaxation_multipliers_, &multipliers_}) vector->resize(m_);
+  for (KeptVector* vector : {&lambda_, &scaled_, &change_, &gradient_, &products_})
+    vector->resize(n_);
+  for (KeptVector* vector : {&relaxation_multipliers_, &multipliers_}) vector->resize(m_);
   face_.resize(n_, n_);
   R_.resize(n_, n_);
   held_.resize(n_);
@@ -149,6 +163,18 @@ void TwoStageSolver<Scalar>::assembleClosest(Scalar proximity) {
   assemble(slackened_, weights_, proximity);
 }
 
+template <class Scalar>
+typename TwoStageSolver<Scalar>::Status TwoStageSolver<Scalar>::minimizeNorm(Program& program,
+                                                                             Scalar tolerance,
+                                                                             Scalar dependent) {
+  if (iterations_ >= maximal_iterations_) return Status::IterationLimit;
+  ++iterations_;
+  const Status status = program.solver.solve(program.E, program.d, program.G, program.h, tolerance,
+                                             dependent, maximal_iterations_ - iterations_);
+  iterations_ += program.solver.iterations();
+  return status;
+}
+
 // Finds the cheapest forces that give a wrench, which is over the unit. False if there are none,
 // or hardly any.
 template <class Scalar>
@@ -157,9 +183,7 @@ bool TwoStageSolver<Scalar>::minimizeCost(const Vector6& wrench, Scalar dependen
   assembleCheapest(direct_, 0.);
   direct_.d = wrench.cwiseQuotient(direct_.norms);
   direct_.h.setZero(m_);
-  const Status status = direct_.solver.solve(direct_.E, direct_.d, direct_.G, direct_.h,
-                                             Tolerances<Scalar>::kTolerance, dependent);
-  iterations_ += direct_.solver.iterations();
+  const Status status = minimizeNorm(direct_, Tolerances<Scalar>::kTolerance, dependent);
   lambda_ = direct_.solver.x().cwiseQuotient(direct_.scales);
   // The solver leaves out equalities that depend on others, whether they contradict or not.
   return status == Status::Solved &&
@@ -187,9 +211,7 @@ bool TwoStageSolver<Scalar>::minimizeCostOnFace(const Vector6& wrench, Scalar to
   for (int step = 0; step < Tolerances<Scalar>::kMultiplierSteps; ++step) {
     slackened_.d = asked.cwiseQuotient(slackened_.norms);  // weighted, as the slacks are
     const Status status =
-        slackened_.solver.solve(slackened_.E, slackened_.d, slackened_.G, slackened_.h, tolerance,
-                                Tolerances<Scalar>::kDependentInequality);
-    iterations_ += slackened_.solver.iterations();
+        minimizeNorm(slackened_, tolerance, Tolerances<Scalar>::kDependentInequality);
     if (status != Status::Solved) return false;
     lambda_.noalias() = face_ * slackened_.solver.x().tail(n_);
     lambda_ = lambda_.cwiseQuotient(slackened_.scales);
@@ -219,7 +241,7 @@ bool TwoStageSolver<Scalar>::minimizeCostOnFace(const Vector6& wrench, Scalar to
 // after a finite number of steps, because all is linear. As a problem of least norm its variables
 // are (√δ (λ̃ − λ̃₀), s), with s the distance: eᵀ √δ (λ̃ − λ̃₀) + √δ s = √δ (target − e λ̃₀).
 template <class Scalar>
-bool TwoStageSolver<Scalar>::relax(const Vector6& target) {
+bool TwoStageSolver<Scalar>::findClosest(const Vector6& target) {
   Solver& solver = slackened_.solver;
   slackened_.d.resize(6);
   slackened_.h.resize(m_);
@@ -236,9 +258,7 @@ bool TwoStageSolver<Scalar>::relax(const Vector6& target) {
     // Less than what rounding leaves behind, a tolerance can keep the solver going in circles.
     Status status = Status::IterationLimit;
     for (int attempt = 0; attempt < 3 && status == Status::IterationLimit; ++attempt) {
-      status = solver.solve(slackened_.E, slackened_.d, slackened_.G, slackened_.h, tolerance,
-                            Tolerances<Scalar>::kDependentInequality);
-      iterations_ += solver.iterations();
+      status = minimizeNorm(slackened_, tolerance, Tolerances<Scalar>::kDependentInequality);
       tolerance *= 100;
     }
     if (status != Status::Solved) return false;
@@ -262,9 +282,16 @@ bool TwoStageSolver<Scalar>::relax(const Vector6& target) {
   return true;
 }
 
-// Goes on along the last change of relax(), as far as the distance becomes less and no inequality
-// is in the way: directions in which forces hardly give a wrench, such as those of soles that are
-// nearly parallel, would take very many steps.
+template <class Scalar>
+bool TwoStageSolver<Scalar>::relax(const Vector6& target) {
+  iterations_ = 0;
+  maximal_iterations_ = std::numeric_limits<int>::max();
+  return findClosest(target);
+}
+
+// Goes on along the last change of findClosest(), as far as the distance becomes less and no
+// inequality is in the way: directions in which forces hardly give a wrench, such as those of soles
+// that are nearly parallel, would take very many steps.
 template <class Scalar>
 void TwoStageSolver<Scalar>::extrapolate() {
   const Vector6 moved = giveScaled(change_);
@@ -280,7 +307,7 @@ void TwoStageSolver<Scalar>::extrapolate() {
 // The weighted wrench of forces times their scales.
 template <class Scalar>
 typename TwoStageSolver<Scalar>::Vector6 TwoStageSolver<Scalar>::giveScaled(
-    const Vector& forces) const {
+    const KeptVector& forces) const {
   Vector6 wrench;
   wrench.noalias() = slackened_.E.bottomRows(n_).transpose() * forces;
   return wrench.cwiseProduct(slackened_.norms);
@@ -352,8 +379,9 @@ void TwoStageSolver<Scalar>::restrictToFace() {
 }
 
 template <class Scalar>
-DistributionStatus TwoStageSolver<Scalar>::solve(const Vector6& wrench) {
+DistributionStatus TwoStageSolver<Scalar>::solve(const Vector6& wrench, int maximal_iterations) {
   iterations_ = 0;
+  maximal_iterations_ = maximal_iterations;
   relaxation_multipliers_.setZero(m_);
   held_.setConstant(n_, -1);
   on_face_ = false;
@@ -361,7 +389,7 @@ DistributionStatus TwoStageSolver<Scalar>::solve(const Vector6& wrench) {
                    Tolerances<Scalar>::kExactInequality))
     return DistributionStatus::Solved;
 
-  if (!relax(weights_.cwiseProduct(wrench))) return DistributionStatus::NumericalFailure;
+  if (!findClosest(weights_.cwiseProduct(wrench))) return DistributionStatus::NumericalFailure;
   on_face_ = true;
   // Large forces that cancel out want a larger tolerance.
   const Vector6 closest = wrench - distance_.cwiseQuotient(weights_);
@@ -404,7 +432,8 @@ bool TwoStageSolver<Scalar>::passesCheck(const Vector6& wrench, Scalar reach,
 }
 
 template <class Scalar>
-typename TwoStageSolver<Scalar>::Vector6 TwoStageSolver<Scalar>::give(const Vector& forces) const {
+typename TwoStageSolver<Scalar>::Vector6 TwoStageSolver<Scalar>::give(
+    const KeptVector& forces) const {
   Vector6 wrench = Vector6::Zero();
   Eigen::Index col = 0;
   for (const Contact& contact : contacts_) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <ostream>
 #include <utility>
 
@@ -22,6 +23,8 @@ using internal::TwoStageSolver;
 using Contact = DistributionResult::Contact;
 using Vector6 = DistributionResult::Vector6;
 using NewtonEuler = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+using MatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
+using VectorRef = Eigen::Ref<const Eigen::VectorXd>;
 
 // These are for a problem whose weighted wrench has unit size.
 
@@ -55,9 +58,26 @@ double overallWeight(const Vector6& weights, const Vector6& wrench) {
   return size > 0. ? normOf(weighted(weights, wrench)) / size : weights.maxCoeff();
 }
 
-bool haveSameSettings(const Contact& a, const Contact& b) {
-  return a.A.rows() == b.A.rows() && a.A.cols() == b.A.cols() && a.A == b.A &&
-         a.weights == b.weights;
+// Whether two matrices have the same sizes and the same bits: −0 is another number than 0 here.
+bool areSame(const MatrixRef& a, const MatrixRef& b) {
+  if (a.rows() != b.rows() || a.cols() != b.cols()) return false;
+  if (a.size() == 0) return true;
+  return std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(double)) == 0;
+}
+
+void requireInitialised(const ContactBase& contact) {
+  if (contact.cols() == 0) throwInvalid("a contact was never initialised");
+}
+
+// Gives a contact's share of a result its sizes.
+void resize(Contact& contact, Eigen::Index rows, Eigen::Index cols) {
+  contact.A.resize(rows, cols);
+  contact.weights.resize(cols);
+  contact.NE.resize(6, cols);
+  contact.force.setZero(cols);
+  contact.active.setConstant(rows, false);
+  contact.multipliers.setZero(rows);
+  contact.relaxation_multipliers.setZero(rows);
 }
 
 }  // namespace
@@ -177,11 +197,30 @@ bool DistributionResult::isOptimal(double tolerance) const {
 }
 
 struct WrenchDistribution::Workspace {
+  // What is kept of a contact from one problem to the next.
+  struct Slot {
+    // As last added: inequalities in two parts, those of a contact.
+    Eigen::MatrixXd unilaterality, friction;
+    Eigen::VectorXd weights;
+    NewtonEuler NE;
+    bool changed = true;      // whether the last solve() knew other inequalities and weights
+    std::size_t problem = 0;  // the last that it was added to
+    bool in_result = false;   // whether it was part of the last solve()
+    Contact parked;           // its share of the result while it was not
+
+    Eigen::Index rows() const { return unilaterality.rows() + friction.rows(); }
+  };
+
   DistributionResult result;
   Vector6 settings = Vector6::Ones();  // D of the next solve()
-  std::vector<Contact> added;  // since clear(), the first `count`: those of the next solve()
-  std::size_t count = 0;
-  bool has_answer = false;  // whether the forces in result are an answer for its contacts
+  bool warm_start = true;
+  int maximal_iterations = kMaximalIterations;
+
+  std::vector<Slot> slots;
+  std::size_t problem = 1;          // counts clear()
+  std::vector<std::size_t> added;   // slots of the next solve()
+  std::vector<std::size_t> solved;  // slots of the result's contacts
+  bool has_answer = false;          // whether the forces in result are an answer for its contacts
 
   // What forces and wrenches are divided by, and D over its overall weight: for weights of 1 the
   // unit is the scale, and it is the same for all common factors of the weights.
@@ -192,11 +231,17 @@ struct WrenchDistribution::Workspace {
   TwoStageSolver<double> solver;                // what that leaves
   TwoStageSolver<long double> accurate_solver;  // several times slower
 
-  Contact& nextContact();
+  Slot& findSlot(std::size_t slot);
+  Slot& takeSlot(std::size_t slot);
+  void describe(Slot& slot, const MatrixRef& unilaterality, const MatrixRef& friction,
+                const VectorRef& weights);
+  void reserve();
   void takeProblem();
+  void rearrange();
   bool distribute();
   template <class Scalar>
   bool distributeBy(TwoStageSolver<Scalar>& solver);
+  bool hasFiniteMatrices() const;
   void keepAnswer();
   void sumUp();
   bool findDistance(const Vector6& target, Vector6& distance);
@@ -205,7 +250,9 @@ struct WrenchDistribution::Workspace {
 
 WrenchDistribution::WrenchDistribution() : work_(std::make_unique<Workspace>()) {}
 WrenchDistribution::WrenchDistribution(const WrenchDistribution& other)
-    : work_(std::make_unique<Workspace>(*other.work_)) {}
+    : work_(std::make_unique<Workspace>(*other.work_)) {
+  work_->reserve();  // which copying has undone
+}
 WrenchDistribution::WrenchDistribution(WrenchDistribution&& other) noexcept
     : WrenchDistribution() {  // the other can be used again
   std::swap(work_, other.work_);
@@ -225,29 +272,101 @@ void WrenchDistribution::setWrenchWeights(const Vector6& weights) {
 
 const Vector6& WrenchDistribution::getWrenchWeights() const { return work_->settings; }
 
-void WrenchDistribution::clear() { work_->count = 0; }
+void WrenchDistribution::setWarmStart(bool warmStart) { work_->warm_start = warmStart; }
+
+bool WrenchDistribution::getWarmStart() const { return work_->warm_start; }
+
+void WrenchDistribution::setMaximalIterations(int maximalIterations) {
+  if (maximalIterations <= 0)
+    throwInvalid("maximalIterations must be > 0, got ", maximalIterations);
+  work_->maximal_iterations = maximalIterations;
+}
+
+int WrenchDistribution::getMaximalIterations() const { return work_->maximal_iterations; }
+
+void WrenchDistribution::clear() {
+  work_->added.clear();
+  ++work_->problem;
+}
+
+void WrenchDistribution::reset() {
+  auto fresh = std::make_unique<Workspace>();
+  fresh->settings = work_->settings;
+  fresh->warm_start = work_->warm_start;
+  fresh->maximal_iterations = work_->maximal_iterations;
+  work_ = std::move(fresh);
+}
 
 void WrenchDistribution::forgetForces() { work_->has_answer = false; }
 
 const DistributionResult& WrenchDistribution::result() const { return work_->result; }
 
-// The contact to be filled in.
-Contact& WrenchDistribution::Workspace::nextContact() {
-  if (count == added.size()) added.emplace_back();
-  return added[count++];
+WrenchDistribution::Workspace::Slot& WrenchDistribution::Workspace::findSlot(std::size_t slot) {
+  if (slot > slots.size())
+    throwInvalid("slot must be at most ", slots.size(), ", the first that is free, got ", slot);
+  if (slot == slots.size()) slots.emplace_back();
+  return slots[slot];
 }
 
-void WrenchDistribution::add(const ContactBase& contact) {
-  if (contact.cols() == 0) throwInvalid("a contact was never initialised");
+// The slot, as a part of the next problem.
+WrenchDistribution::Workspace::Slot& WrenchDistribution::Workspace::takeSlot(std::size_t slot) {
+  Slot& found = findSlot(slot);
+  if (found.problem == problem) throwInvalid("slot ", slot, " is taken already");
+  found.problem = problem;
+  added.push_back(slot);
+  return found;
+}
+
+// What is the same as before is not written: this happens at every tick.
+void WrenchDistribution::Workspace::describe(Slot& slot, const MatrixRef& unilaterality,
+                                             const MatrixRef& friction, const VectorRef& weights) {
+  if (areSame(slot.unilaterality, unilaterality) && areSame(slot.friction, friction) &&
+      areSame(slot.weights, weights))
+    return;
+  const Eigen::Index rows = unilaterality.rows() + friction.rows(), cols = weights.size();
+  const bool same_sizes = slot.rows() == rows && slot.weights.size() == cols;
+  slot.unilaterality = unilaterality;
+  slot.friction = friction;
+  slot.weights = weights;
+  slot.changed = true;
+  if (same_sizes) return;
+  slot.NE.resize(6, cols);
+  if (!slot.in_result) resize(slot.parked, rows, cols);
+  reserve();
+}
+
+// Gets storage for problems with any of the slots.
+void WrenchDistribution::Workspace::reserve() {
+  Eigen::Index rows = 0, cols = 0, all_rows = 0, all_cols = 0;
+  for (const Slot& slot : slots) {
+    rows = std::max(rows, slot.rows());
+    cols = std::max(cols, slot.weights.size());
+    all_rows += slot.rows();
+    all_cols += slot.weights.size();
+  }
+  added.reserve(slots.size());
+  solved.reserve(slots.size());
+  result.contacts.reserve(slots.size());
+  newton.reserve(slots.size());
+  solver.reserve(slots.size(), rows, cols, all_rows, all_cols);
+  accurate_solver.reserve(slots.size(), rows, cols, all_rows, all_cols);
+}
+
+void WrenchDistribution::reserve(const ContactBase& contact, std::size_t slot) {
+  requireInitialised(contact);
+  work_->describe(work_->findSlot(slot), contact.uni_A(), contact.fri_A(), contact.reg_A());
+}
+
+void WrenchDistribution::add(const ContactBase& contact) { add(contact, work_->added.size()); }
+
+void WrenchDistribution::add(const ContactBase& contact, std::size_t slot) {
+  requireInitialised(contact);
   if (contact.ne_A().isZero(0.))
     throw NotReadyError("contact '" + contact.getFrameName() +
                         "' is used before updateNewtonEuler()");
-  Contact& next = work_->nextContact();
-  next.A.resize(contact.uni_rows() + contact.fri_rows(), contact.cols());
-  next.A.topRows(contact.uni_rows()) = contact.uni_A();
-  next.A.bottomRows(contact.fri_rows()) = contact.fri_A();
-  next.weights = contact.reg_A();
-  next.NE = contact.ne_A();
+  Workspace::Slot& taken = work_->takeSlot(slot);
+  work_->describe(taken, contact.uni_A(), contact.fri_A(), contact.reg_A());
+  taken.NE = contact.ne_A();
 }
 
 void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
@@ -259,47 +378,64 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
   if (!A.allFinite()) throwInvalid("A must be finite");
   if (!weights.allFinite() || !(weights.array() > 0.).all())
     throwInvalid("weights must be finite and > 0, got ", weights.transpose());
-  Contact& next = work_->nextContact();
-  next.A = A;
-  next.weights = weights;
-  next.NE = NE;
+  Workspace::Slot& taken = work_->takeSlot(work_->added.size());
+  const Eigen::MatrixXd no_friction(0, A.cols());
+  work_->describe(taken, A, no_friction, weights);
+  taken.NE = NE;
 }
 
 // The contacts that were added become those of the result, which keeps its forces if only their
 // places have changed.
 void WrenchDistribution::Workspace::takeProblem() {
-  bool same = result.contacts.size() == count;
-  result.contacts.resize(count);
-  for (std::size_t k = 0; k < count; ++k) {
+  bool same = added == solved;
+  if (!same) rearrange();
+  for (std::size_t k = 0; k < solved.size(); ++k) {
+    Slot& slot = slots[solved[k]];
     Contact& contact = result.contacts[k];
-    if (!haveSameSettings(contact, added[k])) {
-      same = false;
-      contact.A = added[k].A;
-      contact.weights = added[k].weights;
-      contact.force.setZero(contact.A.cols());
-      contact.active.resize(contact.A.rows());
-      contact.multipliers.resize(contact.A.rows());
-      contact.relaxation_multipliers.resize(contact.A.rows());
+    if (slot.changed) {
+      resize(contact, slot.rows(), slot.weights.size());
+      contact.A.topRows(slot.unilaterality.rows()) = slot.unilaterality;
+      contact.A.bottomRows(slot.friction.rows()) = slot.friction;
+      contact.weights = slot.weights;
+      newton.setContact(solved[k], contact);
+      slot.changed = same = false;
     }
-    contact.NE = added[k].NE;
+    contact.NE.swap(slot.NE);
   }
   if (same) return;
   has_answer = false;
-  newton.setContacts(result.contacts);
-  solver.setProblem(result.contacts, wrench_weights);  // for their storage
-  accurate_solver.setProblem(result.contacts, wrench_weights);
+  newton.setActive(solved, result.contacts);
+}
+
+// Puts away the shares of the contacts that took part, and gets those of the ones that do now.
+void WrenchDistribution::Workspace::rearrange() {
+  const auto exchange = [&](bool in_result) {
+    for (std::size_t k = 0; k < solved.size(); ++k) {
+      Slot& slot = slots[solved[k]];
+      std::swap(slot.parked, result.contacts[k]);
+      slot.in_result = in_result;
+    }
+  };
+  exchange(false);
+  solved = added;
+  result.contacts.resize(solved.size());
+  exchange(true);
 }
 
 // Few problems need more digits than double has: those where contacts are nearly parallel, and
 // where the wrench is so close to the boundary that it is barely known which side it is on.
 // Returns false if there is no answer.
 bool WrenchDistribution::Workspace::distribute() {
-  result.status = newton.solve(result.contacts, result.wrench / unit, wrench_weights);
+  result.status = newton.solve(result.contacts, result.wrench / unit, wrench_weights, warm_start,
+                               maximal_iterations);
   result.iterations = newton.iterations();
   if (result.status != DistributionStatus::NumericalFailure) {
     newton.writeAnswer(result, unit, overall_weight);
-    sumUp();
     return true;
+  }
+  if (!hasFiniteMatrices()) {
+    result.status = DistributionStatus::InvalidInput;
+    return false;
   }
   const bool answered = distributeBy(solver);
   if (answered && !solver.hasFewDigits() && result.isOptimal(kProof)) return true;
@@ -312,12 +448,18 @@ bool WrenchDistribution::Workspace::distribute() {
 template <class Scalar>
 bool WrenchDistribution::Workspace::distributeBy(TwoStageSolver<Scalar>& solver) {
   solver.setProblem(result.contacts, wrench_weights);
-  result.status = solver.solve(result.wrench.template cast<Scalar>() / static_cast<Scalar>(unit));
+  result.status = solver.solve(result.wrench.template cast<Scalar>() / static_cast<Scalar>(unit),
+                               maximal_iterations - result.iterations);
   result.iterations += solver.iterations();
   if (result.status == DistributionStatus::NumericalFailure) return false;
   solver.writeAnswer(result, unit, overall_weight);
   sumUp();
   return true;
+}
+
+bool WrenchDistribution::Workspace::hasFiniteMatrices() const {
+  return std::all_of(result.contacts.begin(), result.contacts.end(),
+                     [](const Contact& contact) { return contact.NE.allFinite(); });
 }
 
 // Leaves the forces of the last answer where they are, or zeros if there is none.
@@ -359,15 +501,14 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   work.wrench_weights = weights / work.overall_weight;
   work.takeProblem();
 
-  bool finite = wrench.allFinite() && std::isfinite(minimalScale);
-  for (const Contact& contact : result.contacts) finite = finite && contact.NE.allFinite();
   bool answered = false;
-  if (!finite) {
+  const bool finite = wrench.allFinite() && std::isfinite(minimalScale);
+  const bool computable = std::isfinite(work.unit) && std::isfinite(result.scale);
+  if (!finite || (!(computable && work.unit > 0.) && !work.hasFiniteMatrices())) {
     result.status = DistributionStatus::InvalidInput;
-  } else if (!std::isfinite(work.unit) ||
-             !std::isfinite(result.scale)) {  // beyond the largest numbers
+  } else if (!computable) {  // beyond the largest numbers
     result.status = DistributionStatus::NumericalFailure;
-  } else if (work.count == 0) {
+  } else if (work.solved.empty()) {
     const bool zero = normOf(weighted(weights, wrench)) <= kReach * result.scale;
     result.status = zero ? DistributionStatus::Solved : DistributionStatus::NoContact;
   } else if (work.unit == 0.) {

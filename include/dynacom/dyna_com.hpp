@@ -40,10 +40,11 @@ DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const DynaCoMSettings
 /// Everything is in the world's axes unless another frame is named. Before computeDynamics() all
 /// numbers of the motion are NaN.
 ///
-/// Once the contacts are set and each was called once, computeDynamics(), computeNL(),
-/// distributeForce() and the getters that return references neither allocate nor print, and throw
-/// only for mistakes in the program: a vector of the wrong size, a contact whose frame does not
-/// exist. The first distribution after a contact was activated or deactivated may allocate.
+/// Once the contacts are added, computeDynamics(), computeNL(), distributeForce(),
+/// activateContact(), deactivateContact(), setContactPose() and the getters that return references
+/// or small vectors neither allocate, nor lock, nor call the system, nor print, and throw only for
+/// mistakes in the program: a vector of the wrong size, a contact whose frame does not exist. That
+/// a contact is initialised again counts as adding it.
 class DYNACOM_EXPORT DynaCoM {
  public:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -95,6 +96,18 @@ class DYNACOM_EXPORT DynaCoM {
   /// @throws std::invalid_argument unless all are finite and > 0
   void setWrenchWeights(const Vector6& weights) { distribution_.setWrenchWeights(weights); }
 
+  /// Whether a distribution starts from the inequalities that were active in the last one, contact
+  /// by contact, see WrenchDistribution::setWarmStart().
+  bool getWarmStart() const { return distribution_.getWarmStart(); }
+  void setWarmStart(bool warmStart) { distribution_.setWarmStart(warmStart); }
+
+  /// How many iterations a distribution may take, see WrenchDistribution::setMaximalIterations().
+  int getMaximalIterations() const { return distribution_.getMaximalIterations(); }
+  /// @throws std::invalid_argument unless maximalIterations > 0
+  void setMaximalIterations(int maximalIterations) {
+    distribution_.setMaximalIterations(maximalIterations);
+  }
+
   /// Computes the centroidal state, the ground wrench by equations (1, 2), the placement of all
   /// known contacts, and the centre of pressure. On flat horizontal ground that is equation (5).
   /// Elsewhere the wrench is first distributed, see distributeForce(), and from what the contacts
@@ -115,6 +128,17 @@ class DYNACOM_EXPORT DynaCoM {
   ///         initialize()
   void computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
                        const Vector6& extWrench = Vector6::Zero(),
+                       bool flatHorizontalGround = true);
+
+  /// The same for a motion of which all that Pinocchio computes is known:
+  /// computeCentroidalMomentumTimeVariation(getModel(), data, q, v, a) has run on data, and nothing
+  /// since that changes its com, vcom, hg, dhg, mass or oMi. Those are read, and oMi is copied to
+  /// getData(), so that contacts can be placed later; nothing else in getData() is that of the
+  /// motion.
+  /// @throws std::invalid_argument if data has another number of joints; NotReadyError if its mass
+  ///         is not the robot's, because that algorithm has never run on it, and before
+  ///         initialize()
+  void computeDynamics(const pinocchio::Data& data, const Vector6& extWrench = Vector6::Zero(),
                        bool flatHorizontalGround = true);
 
   /// Of the last computeDynamics(): the wrench that the ground must give, about the CoM.
@@ -182,6 +206,15 @@ class DYNACOM_EXPORT DynaCoM {
   void activateContact6d(const std::string& name) { activateContact(name); }
   void deactivateContact6d(const std::string& name) { deactivateContact(name); }
 
+  /// Places a contact's frame where it was measured, wherever the model says that it is: from now
+  /// on, until it is set again or resetContactPose().
+  /// @param oMs  placement of the contact's frame in the world; see ContactBase::getSurfacePose()
+  /// @throws std::invalid_argument if the name is not known
+  void setContactPose(const std::string& name, const pinocchio::SE3& oMs);
+  /// Places a contact by the model again, from the next computeDynamics() or distributeForce() on.
+  /// @throws std::invalid_argument if the name is not known
+  void resetContactPose(const std::string& name);
+
   /// @throws std::invalid_argument if the name is not known
   const std::shared_ptr<ContactBase>& getContact(const std::string& name) const;
   /// Names of the active contacts, in the order of their activation.
@@ -189,9 +222,10 @@ class DYNACOM_EXPORT DynaCoM {
   /// Names of all contacts: the active ones as above, then the others.
   std::vector<std::string> getKnownContacts() const;
 
-  /// Shares a wrench between the active contacts, placed by getData(): the cheapest forces that
-  /// give it within all inequalities, equations (9–13), or the closest wrench that they can give.
-  /// Each contact is given its force. What it all amounts to is in getDistribution().
+  /// Shares a wrench between the active contacts, placed by getData() or setContactPose(): the
+  /// cheapest forces that give it within all inequalities, equations (9–13), or the closest wrench
+  /// that they can give. Each contact is given its force. What it all amounts to is in
+  /// getDistribution().
   ///
   /// DistributionStatus says which case it was. Where there is no answer (InvalidInput,
   /// NumericalFailure), forces are those of the last one, unless a contact was activated or
@@ -241,7 +275,7 @@ class DYNACOM_EXPORT DynaCoM {
  private:
   // A copy has a contact of its own; a move keeps it.
   struct Entry {
-    Entry(std::string name, std::shared_ptr<ContactBase> contact, bool active);
+    Entry(std::string name, std::shared_ptr<ContactBase> contact, std::size_t slot);
     Entry(const Entry& other);
     Entry(Entry&&) noexcept = default;
     Entry& operator=(const Entry& other);
@@ -249,7 +283,9 @@ class DYNACOM_EXPORT DynaCoM {
 
     std::string name;
     std::shared_ptr<ContactBase> contact;
-    bool active;
+    std::size_t slot;  // of the distribution
+    bool active = false;
+    bool measured = false;  // placed by setContactPose()
   };
 
   void setModel(pinocchio::Model&& model, DynaCoMSettings&& settings);
@@ -260,7 +296,10 @@ class DYNACOM_EXPORT DynaCoM {
   std::vector<Entry>::iterator find(const std::string& name);
   std::vector<Entry>::iterator firstInactive();
   void updateFrames();
-  void place(ContactBase& contact, const Eigen::Vector3d& com);
+  void place(const Entry& entry, const Eigen::Vector3d& com);
+  void takeMotion(const CentroidalState& state, bool finite, const Vector6& extWrench,
+                  bool flatHorizontalGround);
+  std::size_t findFreeSlot() const;
   bool isLoaded(const ContactBase& contact) const;
   double getUsage(const std::string& name, double (ContactBase::*usage)() const) const;
   Eigen::Vector2d computePressureCentre() const;

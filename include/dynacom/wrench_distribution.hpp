@@ -26,8 +26,9 @@ enum class DistributionStatus {
   /// A number that came in was not finite. The forces are those of the last Solved or Relaxed, if
   /// contacts and settings are still the same, else zero.
   InvalidInput,
-  /// The iterations were used up, or the answer did not pass the check. The forces are as for
-  /// InvalidInput.
+  /// The iterations were used up (WrenchDistribution::setMaximalIterations()), or the answer did
+  /// not
+  /// pass the check. The forces are as for InvalidInput.
   NumericalFailure,
 };
 
@@ -108,11 +109,17 @@ struct DYNACOM_EXPORT WrenchMargin {
 /// and where no forces do that, in two stages: first the reachable wrench closest to w in the norm
 /// ‖D w‖, then the cheapest forces that give it.
 ///
-/// Usage: clear(), add() every contact, solve(), result(). What is added is copied; nothing is
-/// allocated once a problem of the same sizes has been solved.
+/// Usage: clear(), add() every contact, solve(), result(). What is added is copied.
+///
+/// Contacts are held in slots, numbered from 0 on. What is kept from one problem to the next is
+/// kept by slot: storage, so that nothing is allocated for contacts that were reserved or have been
+/// part of a problem before, and which inequalities were active, from where the next solve()
+/// starts.
 class DYNACOM_EXPORT WrenchDistribution {
  public:
   using Vector6 = DistributionResult::Vector6;
+
+  static constexpr int kMaximalIterations = 10000;
 
   WrenchDistribution();
   WrenchDistribution(const WrenchDistribution& other);
@@ -128,21 +135,46 @@ class DYNACOM_EXPORT WrenchDistribution {
   void setWrenchWeights(const Vector6& weights);
   const Vector6& getWrenchWeights() const;
 
-  /// Begins a new problem, without contacts. If what is added next has the inequalities and weights
-  /// of before, a solve() without an answer keeps the forces of before.
+  /// Whether solve() starts from the inequalities that were active in each slot's last answer, as
+  /// is the default; else it starts with none. That changes how long it takes, and answers by no
+  /// more than rounding.
+  void setWarmStart(bool warmStart);
+  bool getWarmStart() const;
+
+  /// How many iterations solve() may take, kMaximalIterations by default: those of
+  /// DistributionResult::iterations. Of feet on level ground nearly all problems take less than 10;
+  /// a problem that needs more than this ends as DistributionStatus::NumericalFailure.
+  /// @throws std::invalid_argument unless maximalIterations > 0
+  void setMaximalIterations(int maximalIterations);
+  int getMaximalIterations() const;
+
+  /// Gets a slot's storage ready for a contact, so that a problem with it allocates nothing,
+  /// whichever of the other slots take part.
+  /// @throws std::invalid_argument if the contact was never initialised
+  void reserve(const ContactBase& contact, std::size_t slot);
+
+  /// Forgets contacts, slots, and the answer; weights and settings stay.
+  void reset();
+
+  /// Begins a new problem, without contacts. If what is added next has the slots, inequalities and
+  /// weights of before, a solve() without an answer keeps the forces of before.
   void clear();
 
-  /// Adds a contact, with the matrices that it has now.
-  /// @throws std::invalid_argument if the contact was never initialised; NotReadyError if it was
-  ///         never placed by updateNewtonEuler()
+  /// Adds a contact, with the matrices that it has now, in the slot of its position.
+  /// @throws std::invalid_argument if the contact was never initialised, or the slot is taken;
+  ///         NotReadyError if it was never placed by updateNewtonEuler()
   void add(const ContactBase& contact);
 
-  /// Adds a contact by its matrices.
+  /// The same in another slot, for contacts that are not always the same ones.
+  void add(const ContactBase& contact, std::size_t slot);
+
+  /// Adds a contact by its matrices, in the slot of its position.
   /// @param A        inequalities A λ ≤ 0, m × n
   /// @param weights  wᵢ > 0 of the cost, n
   /// @param NE       takes λ to the wrench about the CoM, 6 × n
-  /// @throws std::invalid_argument if the sizes do not fit, n is 0, A is not finite, or a weight is
-  ///         not finite and > 0
+  /// @throws std::invalid_argument if the sizes do not fit, n is 0, A is not finite, a weight is
+  /// not
+  ///         finite and > 0, or the slot is taken
   void add(const Eigen::Ref<const Eigen::MatrixXd>& A,
            const Eigen::Ref<const Eigen::VectorXd>& weights,
            const Eigen::Ref<const Eigen::Matrix<double, 6, Eigen::Dynamic>>& NE);
