@@ -75,6 +75,7 @@ MakeWrench onBoundary(const std::vector<double>& shares) {
 // subject to CE x + ce0 = 0 and CI x + ci0 ≥ 0.
 struct Problem {
   explicit Problem(const Task& task) : robot(task.makeRobot()) {
+    robot.setWarmStart(false);
     const pinocchio::Model& model = robot.getModel();
     const Eigen::VectorXd zero = Eigen::VectorXd::Zero(model.nv);
     robot.computeDynamics(pinocchio::neutral(model), zero, zero);

@@ -163,8 +163,8 @@ void DualNewton::setContact(std::size_t slot, const Contact& contact) {
     if (i != BoxCone::kNormal && beta == 0.) block.free.bounds[static_cast<std::size_t>(i)] = 1;
   }
   block.reaches[BoxCone::kNormal] = 1.;
+  block.last = block.free;
   block.e.setZero();
-  enter(block, block.free);
 }
 
 void DualNewton::setActive(const std::vector<std::size_t>& slots,
@@ -185,9 +185,13 @@ void DualNewton::setActive(const std::vector<std::size_t>& slots,
   }
 }
 
-// Begins with all components free, but for those that are always zero.
-void DualNewton::release() {
-  for (const std::size_t slot : active_) enter(blocks_[slot], blocks_[slot].free);
+// Begins with the states of the last answer, or with all components free but for those that are
+// always zero.
+void DualNewton::begin(bool from_last_answer) {
+  for (const std::size_t slot : active_) {
+    Block& block = blocks_[slot];
+    enter(block, from_last_answer ? block.last : block.free);
+  }
 }
 
 void DualNewton::enter(Block& block, const State& state) {
@@ -347,7 +351,12 @@ bool DualNewton::stepFreely() {
     keepStates();
     const bool changed = evaluate();
     if (!changed) refine(target_, kMissing);
-    if (isReached(target_, kMissing)) return isFinite();
+    if (isReached(target_, kMissing)) {
+      // Where components are just at their bounds, rounding may say of the state at hand that it is
+      // another; the one before has led here.
+      for (const std::size_t slot : active_) blocks_[slot].last = blocks_[slot].former;
+      return isFinite();
+    }
     if (!changed) return false;
   }
   return false;
@@ -427,6 +436,7 @@ DistributionStatus DualNewton::finish() {
   refine(closest, reached ? kMissing : kExact);
   if (!isReached(closest, kMissing) || !provesItself() || !isFinite())
     return DistributionStatus::NumericalFailure;
+  for (const std::size_t slot : active_) blocks_[slot].last = blocks_[slot].state;
   return reached ? DistributionStatus::Solved : DistributionStatus::Relaxed;
 }
 
@@ -571,19 +581,19 @@ DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const
     });
   }
 
-  const DistributionStatus status = search(warm_start && has_state_);
-  has_state_ = status != DistributionStatus::NumericalFailure;
+  const DistributionStatus status = search(warm_start && has_answer_);
+  has_answer_ = status != DistributionStatus::NumericalFailure;
   return status;
 }
 
-DistributionStatus DualNewton::search(bool from_last_state) {
-  if (!from_last_state) release();
+DistributionStatus DualNewton::search(bool from_last_answer) {
+  begin(from_last_answer);
   bool reached = stepFreely();
-  if (!reached && from_last_state && iterations_ == 1 && !hasFullRank()) {
+  if (!reached && from_last_answer && iterations_ == 1 && !hasFullRank()) {
     // The last wrench was out of reach: if this one is, too, the state leads to the answer.
     const DistributionStatus status = finish();
     if (status != DistributionStatus::NumericalFailure) return status;
-    release();
+    begin(false);
     reached = stepFreely();
   }
   if (reached) {

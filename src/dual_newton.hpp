@@ -125,8 +125,9 @@ class DualNewton {
     Vector6 betas;                     // of x
     Vector6 reaches;                   // by which components are free; ∞ without extent
     Matrix6 e;                         // D NE W⁻¹
-    // The state with no component at its bound, but for those without extent, and that at hand.
-    State free, state, former;
+    // The state with no component at its bound, but for those without extent; that at hand, and at
+    // the last keepStates(); and the one that led to the last answer.
+    State free, state, former, last;
     // In this state, forces that respond to a pull are its projection on the free components, and
     // on the direction in which those at their bounds go with the normal force.
     Vector6 is_free, edge;
@@ -142,7 +143,7 @@ class DualNewton {
   static Vector6 respond(const Block& block, const Vector6& pull);
   static Vector6 pullOf(const Block& block, const Vector6& multipliers);
   static void addWrench(const Block& block, const Vector6& force, Vector6& wrench);
-  void release();
+  void begin(bool from_last_answer);
   void keepStates();
   bool evaluate();
   void restart(const Vector6& multipliers);
@@ -154,7 +155,7 @@ class DualNewton {
   bool isFinite() const;
   bool stepFreely();
   bool stepWithSlack();
-  DistributionStatus search(bool from_last_state);
+  DistributionStatus search(bool from_last_answer);
   void settle();
   bool findRange();
   Vector6 solveRange(const Vector6& wrench) const;
@@ -164,7 +165,7 @@ class DualNewton {
   std::vector<Block> blocks_;        // by slot
   std::vector<std::size_t> active_;  // slots
   bool recognised_ = false;          // whether all active cones are boxes
-  bool has_state_ = false;           // whether the states are those of an answer
+  bool has_answer_ = false;          // whether the last solve() had one
   double largest_weight_ = 0.;       // of the active contacts
   Vector6 weights_ = Vector6::Ones(), target_ = Vector6::Zero();
   Vector6 multipliers_ = Vector6::Zero(), achieved_ = Vector6::Zero();
