@@ -12,13 +12,14 @@ void ContactBase::updateNewtonEuler(const Eigen::Vector3d& com, const SE3& oMs) 
   pose_ = oMs;
   if (cols() == 0) return;
   const SE3 surface = getSurfacePose();
+  const Eigen::Matrix3d& R = surface.rotation();
   const Eigen::Vector3d lever = surface.translation() - com;
   // The force adjoint from s to the frame at the CoM with the world's axes: [R 0; [p − c]×R R], of
   // which a point has the three columns of the force.
-  ne_A_.topLeftCorner<3, 3>() = surface.rotation();
-  for (int axis = 0; axis < 3; ++axis)
-    ne_A_.col(axis).tail<3>() = lever.cross(surface.rotation().col(axis));
-  if (cols() == 6) ne_A_.bottomRightCorner<3, 3>() = surface.rotation();
+  Eigen::Map<Eigen::Matrix<double, 6, 3>> of_force(ne_A_.data());
+  of_force.topRows<3>() = R;
+  for (int axis = 0; axis < 3; ++axis) of_force.col(axis).tail<3>() = lever.cross(R.col(axis));
+  if (cols() == 6) ne_A_.bottomRightCorner<3, 3>() = R;
 }
 
 void ContactBase::applyForce(const Eigen::Ref<const Eigen::VectorXd>& force) {

@@ -72,19 +72,28 @@ void unroll6(Function function) {
 
 }  // namespace
 
-// Column by column. Segments of vectors begin at an even row, as packets of two do; what they hold
-// above the diagonal is not used.
+// Column by column, with all numbers in registers.
 void Factors6::compute(const Matrix6& matrix) {
-  Matrix6 rest = matrix;
+  double rest[6][6];
+  unroll6([&](auto row) {
+    unroll6([&](auto column) {
+      constexpr int i = row, j = column;
+      if constexpr (j <= i) rest[i][j] = matrix(i, j);
+    });
+  });
   unroll6([&](auto column) {
-    constexpr int j = column, below = 6 - j / 2 * 2;
-    pivots_[j] = rest(j, j);
-    inverse_pivots_[j] = 1. / rest(j, j);
-    L_.col(j).template tail<below>() = rest.col(j).template tail<below>() * inverse_pivots_[j];
-    unroll6([&](auto next_column) {
-      constexpr int k = next_column, segment = 6 - k / 2 * 2;
-      if constexpr (k > j)
-        rest.col(k).template tail<segment>() -= L_.col(j).template tail<segment>() * rest(k, j);
+    constexpr int j = column;
+    pivots_[j] = rest[j][j];
+    inverse_pivots_[j] = 1. / rest[j][j];
+    unroll6([&](auto row) {
+      constexpr int i = row;
+      if constexpr (i > j) L_(i, j) = rest[i][j] * inverse_pivots_[j];
+    });
+    unroll6([&](auto row) {
+      unroll6([&](auto next_column) {
+        constexpr int i = row, k = next_column;
+        if constexpr (k > j && k <= i) rest[i][k] -= L_(i, j) * rest[k][j];
+      });
     });
   });
 }
@@ -92,13 +101,17 @@ void Factors6::compute(const Matrix6& matrix) {
 Factors6::Vector6 Factors6::solve(const Vector6& rhs) const {
   Vector6 x = rhs;
   unroll6([&](auto column) {
-    constexpr int j = column;
-    x.template tail<5 - j>() -= L_.col(j).template tail<5 - j>() * x[j];
+    unroll6([&](auto row) {
+      constexpr int i = row, j = column;
+      if constexpr (i > j) x[i] -= L_(i, j) * x[j];
+    });
   });
   x = x.cwiseProduct(inverse_pivots_);
   unroll6([&](auto step) {
-    constexpr int j = 5 - step;
-    x[j] -= L_.col(j).template tail<5 - j>().dot(x.template tail<5 - j>());
+    unroll6([&](auto row) {
+      constexpr int i = row, j = 5 - step;
+      if constexpr (i < j) x[i] -= L_(j, i) * x[j];
+    });
   });
   return x;
 }
@@ -165,6 +178,9 @@ void DualNewton::setContact(std::size_t slot, const Contact& contact) {
   block.reaches[BoxCone::kNormal] = 1.;
   block.last = block.free;
   block.e.setZero();
+  block.state = State();
+  block.is_free.setZero();
+  block.edge.setZero();
 }
 
 void DualNewton::setActive(const std::vector<std::size_t>& slots,
@@ -195,7 +211,9 @@ void DualNewton::begin(bool from_last_answer) {
 }
 
 void DualNewton::enter(Block& block, const State& state) {
-  block.state = state;
+  const bool same = state == block.state;
+  block.state = state;  // where there is no load, bounds may differ
+  if (same) return;
   block.is_free.setZero();
   block.edge.setZero();
   block.inverse_stiffness = 0.;
@@ -244,7 +262,7 @@ DualNewton::State DualNewton::findState(const Block& block, const Vector6& pull)
   return state;
 }
 
-DualNewton::Vector6 DualNewton::pullOf(const Block& block, const Vector6& multipliers) {
+EIGEN_STRONG_INLINE DualNewton::Vector6 DualNewton::pullOf(const Block& block, const Vector6& multipliers) {
   Vector6 pull = Vector6::Zero();
   withSize(block.cone.size, [&](auto size) {
     pull.template head<size>().noalias() =
@@ -259,7 +277,7 @@ DualNewton::Vector6 DualNewton::respond(const Block& block, const Vector6& pull)
          (block.edge.dot(pull) * block.inverse_stiffness) * block.edge;
 }
 
-void DualNewton::addWrench(const Block& block, const Vector6& force, Vector6& wrench) {
+EIGEN_STRONG_INLINE void DualNewton::addWrench(const Block& block, const Vector6& force, Vector6& wrench) {
   withSize(block.cone.size, [&](auto size) {
     wrench.noalias() += block.e.template leftCols<size>() * force.template head<size>();
   });
@@ -280,12 +298,10 @@ bool DualNewton::evaluate() {
     const double normal = block.pull[kNormal];
     const bool inside =
         normal > 0. && (block.pull.cwiseAbs() - normal * block.reaches).maxCoeff() <= 0.;
-    const State state = inside ? block.free : findState(block, block.pull);
-    if (state != block.state) enter(block, state);
-    block.state = state;  // where there is no load, too
+    enter(block, inside ? block.free : findState(block, block.pull));
     block.force = respond(block, block.pull);
     addWrench(block, block.force, achieved_);
-    changed = changed || state != block.former;
+    changed = changed || !(block.state == block.former);
   }
   return changed;
 }
@@ -314,24 +330,42 @@ void DualNewton::correct(const Vector6& change) {
   }
 }
 
+// The wrench that a unit of the normal force, and all that goes with it, gives.
+DualNewton::Vector6 DualNewton::normalWrench(const Block& block) {
+  if (block.inverse_stiffness == 1.) return block.e.col(kNormal);
+  Vector6 wrench = Vector6::Zero();
+  addWrench(block, block.edge, wrench);
+  return wrench;
+}
+
 // How the wrench rises with its multipliers, as long as the state stays: the lower half.
 void DualNewton::assembleCompliance() {
   Matrix6 compliance = Matrix6::Zero();
-  const auto add = [&](const auto& a, const auto& b) {
+  // Vectors v of the sum of v vᵀ, two at a time: what is summed up is read and written half as often.
+  const double* waiting = nullptr;
+  const auto add = [&](const double* vector) {
+    if (!waiting) {
+      waiting = vector;
+      return;
+    }
+    const Eigen::Map<const Vector6> a(waiting), b(vector);
     unroll6([&](auto column) {
-      constexpr int j = column, segment = 6 - j / 2 * 2;
-      compliance.col(j).template tail<segment>() += a[j] * b.template tail<segment>();
+      constexpr int j = column, segment = 6 - j / 2 * 2;  // packets of two begin at even rows
+      compliance.col(j).template tail<segment>() +=
+          a[j] * a.template tail<segment>() + b[j] * b.template tail<segment>();
     });
+    waiting = nullptr;
   };
   for (const std::size_t slot : active_) {
-    const Block& block = blocks_[slot];
+    Block& block = blocks_[slot];
     if (!block.state.loaded) continue;
-    Vector6 direction = Vector6::Zero();
-    addWrench(block, block.edge, direction);
-    add(direction, Vector6(direction * block.inverse_stiffness));
+    block.normal_wrench = std::sqrt(block.inverse_stiffness) * normalWrench(block);
+    add(block.normal_wrench.data());
     for (int i = 0; i < block.cone.size; ++i)
-      if (block.is_free[i] != 0.) add(block.e.col(i), block.e.col(i));
+      if (block.is_free[i] != 0.) add(block.e.col(i).data());
   }
+  const Vector6 nothing = Vector6::Zero();
+  if (waiting) add(nothing.data());
   compliance_ = compliance;
 }
 
@@ -456,9 +490,7 @@ bool DualNewton::findRange() {
   for (const std::size_t slot : active_) {
     const Block& block = blocks_[slot];
     if (!block.state.loaded) continue;
-    Vector6 direction = Vector6::Zero();
-    addWrench(block, block.edge, direction);
-    directions_.push_back(direction.normalized());
+    directions_.push_back(normalWrench(block).normalized());
     for (int i = 0; i < block.cone.size; ++i)
       if (block.is_free[i] != 0.) directions_.push_back(block.e.col(i).normalized());
   }

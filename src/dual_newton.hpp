@@ -110,8 +110,8 @@ class DualNewton {
     bool loaded = false;
     std::array<signed char, 6> bounds = {};
 
-    bool operator!=(const State& other) const {
-      return loaded != other.loaded || (loaded && bounds != other.bounds);
+    bool operator==(const State& other) const {
+      return loaded == other.loaded && (!loaded || bounds == other.bounds);
     }
   };
 
@@ -132,6 +132,7 @@ class DualNewton {
     // on the direction in which those at their bounds go with the normal force.
     Vector6 is_free, edge;
     double inverse_stiffness;  // 1 / ‖edge‖²
+    Vector6 normal_wrench;     // of a normal force, and what goes with it, of unit cost
     // Of the multipliers at hand: eᵀ ν, x(ν).
     Vector6 pull, force;
     // Of provesItself().
@@ -143,6 +144,7 @@ class DualNewton {
   static Vector6 respond(const Block& block, const Vector6& pull);
   static Vector6 pullOf(const Block& block, const Vector6& multipliers);
   static void addWrench(const Block& block, const Vector6& force, Vector6& wrench);
+  static Vector6 normalWrench(const Block& block);
   void begin(bool from_last_answer);
   void keepStates();
   bool evaluate();

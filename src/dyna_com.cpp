@@ -5,7 +5,6 @@
 #include <cmath>
 #include <ostream>
 #include <pinocchio/algorithm/center-of-mass.hpp>
-#include <pinocchio/algorithm/frames.hpp>
 #include <utility>
 
 #include "check.hpp"
@@ -302,11 +301,8 @@ void DynaCoM::place(const Entry& entry, const Eigen::Vector3d& com) {
     contact.updateNewtonEuler(com, contact.getPose());
     return;
   }
-  // Frames may have been added to the model behind a reference to it, which data does not know.
-  if (data_.oMf.size() < model_.frames.size())
-    data_.oMf.resize(model_.frames.size(), pinocchio::SE3::Identity());
-  contact.updateNewtonEuler(com,
-                            pinocchio::updateFramePlacement(model_, data_, contact.getFrameID()));
+  const pinocchio::Frame& frame = model_.frames[contact.getFrameID()];
+  contact.updateNewtonEuler(com, data_.oMi[frame.parentJoint] * frame.placement);
 }
 
 void DynaCoM::setContactPose(const std::string& name, const pinocchio::SE3& oMs) {

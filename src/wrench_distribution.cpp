@@ -53,9 +53,8 @@ double normOf(const Vector6& wrench) {
 }
 
 // What D amounts to for a wrench: forces in newtons are a weighted wrench over this.
-double overallWeight(const Vector6& weights, const Vector6& wrench) {
-  const double size = normOf(wrench);
-  return size > 0. ? normOf(weighted(weights, wrench)) / size : weights.maxCoeff();
+double overallWeight(const Vector6& weights, double wrench_size, double weighted_size) {
+  return wrench_size > 0. ? weighted_size / wrench_size : weights.maxCoeff();
 }
 
 // Whether two matrices have the same sizes and the same bits: −0 is another number than 0 here.
@@ -115,7 +114,8 @@ Eigen::VectorXd DistributionResult::forces() const {
 }
 
 bool DistributionResult::isOptimal(double tolerance) const {
-  const double overall_weight = overallWeight(wrench_weights, wrench);
+  const double overall_weight =
+      overallWeight(wrench_weights, normOf(wrench), normOf(weighted(wrench_weights, wrench)));
   const double unit = scale / overall_weight;  // of forces
   const double size = weighted(wrench_weights, residual).norm();
   const double within_reach = kReach * scale;
@@ -494,9 +494,9 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   result.iterations = 0;
   const Vector6& weights = work.settings;
   result.wrench_weights = weights;
-  work.overall_weight = overallWeight(weights, wrench);
-  result.scale =
-      std::max(minimalScale * weights.head<3>().maxCoeff(), normOf(weighted(weights, wrench)));
+  const double weighted_size = normOf(weighted(weights, wrench));
+  work.overall_weight = overallWeight(weights, normOf(wrench), weighted_size);
+  result.scale = std::max(minimalScale * weights.head<3>().maxCoeff(), weighted_size);
   work.unit = result.scale / work.overall_weight;
   work.wrench_weights = weights / work.overall_weight;
   work.takeProblem();
@@ -509,7 +509,7 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   } else if (!computable) {  // beyond the largest numbers
     result.status = DistributionStatus::NumericalFailure;
   } else if (work.solved.empty()) {
-    const bool zero = normOf(weighted(weights, wrench)) <= kReach * result.scale;
+    const bool zero = weighted_size <= kReach * result.scale;
     result.status = zero ? DistributionStatus::Solved : DistributionStatus::NoContact;
   } else if (work.unit == 0.) {
     work.has_answer = false;  // all forces are zero
