@@ -41,9 +41,9 @@ Contact6D::Contact6D(const Contact6DSettings& settings) { initialize(settings); 
 
 void Contact6D::initialize(const Contact6DSettings& settings) {
   settings.validate();
-  reset(5, 6, 6);
   settings_ = settings;
   updateMatrices();
+  reset();
 }
 
 std::shared_ptr<ContactBase> Contact6D::clone() const { return std::make_shared<Contact6D>(*this); }
@@ -97,20 +97,22 @@ void Contact6D::change(Value Contact6DSettings::*field, const Value& value) {
 void Contact6D::updateMatrices() {
   const double dx = settings_.half_length;
   const double dy = settings_.half_width;
-  uni_A_ << 0., 0., -1., 0., 0., 0.,  //
+  Eigen::Matrix<double, 5, 6> uni_A;
+  uni_A << 0., 0., -1., 0., 0., 0.,  //
       0., 0., -dx, 0., -1., 0.,       //
       0., 0., -dy, 1., 0., 0.,        //
       0., 0., -dx, 0., 1., 0.,        //
       0., 0., -dy, -1., 0., 0.;
   const double mu = settings_.mu;
   const double gu = settings_.gu;
-  fri_A_ << 1., 0., -mu, 0., 0., 0.,  //
+  Eigen::Matrix<double, 6, 6> fri_A;
+  fri_A << 1., 0., -mu, 0., 0., 0.,  //
       0., 1., -mu, 0., 0., 0.,        //
       -1., 0., -mu, 0., 0., 0.,       //
       0., -1., -mu, 0., 0., 0.,       //
       0., 0., -gu, 0., 0., 1.,        //
       0., 0., -gu, 0., 0., -1.;
-  reg_A_ = settings_.weights;
+  setMatrices(uni_A, fri_A, settings_.weights);
 }
 
 }  // namespace dynacom

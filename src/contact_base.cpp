@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "dynacom/contact_base.hpp"
 
+#include <atomic>
+
 #include "check.hpp"
 #include "nan.hpp"
 
@@ -50,16 +52,30 @@ double ContactBase::getUsage(double tangential, double coefficient) const {
   return tangential / (coefficient * force_[2]);
 }
 
-void ContactBase::reset(Eigen::Index uni_rows, Eigen::Index fri_rows, Eigen::Index cols) {
-  if (cols != 3 && cols != 6) internal::throwInvalid("cols must be 3 or 6, got ", cols);
-  uni_A_.setZero(uni_rows, cols);
-  uni_b_.setZero(uni_rows);
-  fri_A_.setZero(fri_rows, cols);
-  fri_b_.setZero(fri_rows);
-  reg_A_.setZero(cols);
-  reg_b_.setZero(cols);
-  ne_A_.setZero(6, cols);
-  force_.setZero(cols);
+void ContactBase::setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
+                              const Eigen::Ref<const Eigen::MatrixXd>& fri_A,
+                              const Eigen::Ref<const Eigen::VectorXd>& reg_A) {
+  if (reg_A.size() != 3 && reg_A.size() != 6)
+    internal::throwInvalid("reg_A must have 3 or 6 components, got ", reg_A.size());
+  internal::requireSize("uni_A", uni_A.cols(), reg_A.size(), "columns (as many as reg_A)");
+  internal::requireSize("fri_A", fri_A.cols(), reg_A.size(), "columns (as many as reg_A)");
+  const bool same_cols = reg_A.size() == cols();
+  uni_A_ = uni_A;
+  uni_b_.setZero(uni_A.rows());
+  fri_A_ = fri_A;
+  fri_b_.setZero(fri_A.rows());
+  reg_A_ = reg_A;
+  reg_b_.setZero(cols());
+  static std::atomic<std::uint64_t> revisions{0};  // in all threads
+  revision_ = ++revisions;
+  if (same_cols) return;
+  ne_A_.setZero(6, cols());
+  force_.setZero(cols());
+}
+
+void ContactBase::reset() {
+  ne_A_.setZero();
+  force_.setZero();
   frame_id_ = kUnknownFrame;
 }
 

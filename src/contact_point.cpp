@@ -37,9 +37,9 @@ ContactPoint::ContactPoint(const ContactPointSettings& settings) { initialize(se
 
 void ContactPoint::initialize(const ContactPointSettings& settings) {
   settings.validate();
-  reset(1, 4, 3);
   settings_ = settings;
   updateMatrices();
+  reset();
 }
 
 std::shared_ptr<ContactBase> ContactPoint::clone() const {
@@ -73,12 +73,13 @@ void ContactPoint::change(Value ContactPointSettings::*field, const Value& value
 
 void ContactPoint::updateMatrices() {
   const double mu = settings_.mu;
-  uni_A_ << 0., 0., -1.;
-  fri_A_ << 1., 0., -mu,  //
+  const Eigen::RowVector3d uni_A(0., 0., -1.);
+  Eigen::Matrix<double, 4, 3> fri_A;
+  fri_A << 1., 0., -mu,  //
       0., 1., -mu,        //
       -1., 0., -mu,       //
       0., -1., -mu;
-  reg_A_ = settings_.weights;
+  setMatrices(uni_A, fri_A, settings_.weights);
 }
 
 }  // namespace dynacom

@@ -216,7 +216,6 @@ void DualNewton::enter(Block& block, const State& state) {
   if (same) return;
   block.is_free.setZero();
   block.edge.setZero();
-  block.inverse_stiffness = 0.;
   if (!state.loaded) return;
   for (int i = 0; i < block.cone.size; ++i) {
     const signed char bound = state.bounds[static_cast<std::size_t>(i)];
@@ -225,7 +224,7 @@ void DualNewton::enter(Block& block, const State& state) {
   }
   block.is_free[kNormal] = 0.;
   block.edge[kNormal] = 1.;
-  block.inverse_stiffness = 1. / block.edge.squaredNorm();
+  block.edge.normalize();
 }
 
 // The state that a pull wants. What x_z would have to be less,
@@ -273,8 +272,7 @@ EIGEN_STRONG_INLINE DualNewton::Vector6 DualNewton::pullOf(const Block& block, c
 
 // The forces for a pull, as long as the state stays.
 DualNewton::Vector6 DualNewton::respond(const Block& block, const Vector6& pull) {
-  return block.is_free.cwiseProduct(pull) +
-         (block.edge.dot(pull) * block.inverse_stiffness) * block.edge;
+  return block.is_free.cwiseProduct(pull) + block.edge.dot(pull) * block.edge;
 }
 
 EIGEN_STRONG_INLINE void DualNewton::addWrench(const Block& block, const Vector6& force, Vector6& wrench) {
@@ -330,9 +328,9 @@ void DualNewton::correct(const Vector6& change) {
   }
 }
 
-// The wrench that a unit of the normal force, and all that goes with it, gives.
+// The wrench that a normal force, and what goes with it, of unit cost gives.
 DualNewton::Vector6 DualNewton::normalWrench(const Block& block) {
-  if (block.inverse_stiffness == 1.) return block.e.col(kNormal);
+  if (block.edge[kNormal] == 1.) return block.e.col(kNormal);
   Vector6 wrench = Vector6::Zero();
   addWrench(block, block.edge, wrench);
   return wrench;
@@ -359,7 +357,7 @@ void DualNewton::assembleCompliance() {
   for (const std::size_t slot : active_) {
     Block& block = blocks_[slot];
     if (!block.state.loaded) continue;
-    block.normal_wrench = std::sqrt(block.inverse_stiffness) * normalWrench(block);
+    block.normal_wrench = normalWrench(block);
     add(block.normal_wrench.data());
     for (int i = 0; i < block.cone.size; ++i)
       if (block.is_free[i] != 0.) add(block.e.col(i).data());

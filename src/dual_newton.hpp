@@ -131,7 +131,6 @@ class DualNewton {
     // In this state, forces that respond to a pull are its projection on the free components, and
     // on the direction in which those at their bounds go with the normal force.
     Vector6 is_free, edge;
-    double inverse_stiffness;  // 1 / ‖edge‖²
     Vector6 normal_wrench;     // of a normal force, and what goes with it, of unit cost
     // Of the multipliers at hand: eᵀ ν, x(ν).
     Vector6 pull, force;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <ostream>
 #include <utility>
 
@@ -47,7 +46,7 @@ Vector6 weighted(const Vector6& weights, const Vector6& wrench) {
 }
 
 // The norm, also of numbers whose squares would be too large or too small: that takes longer.
-double normOf(const Vector6& wrench) {
+inline double normOf(const Vector6& wrench) {
   const double norm = wrench.norm();
   return norm > 1e-140 && norm < 1e140 ? norm : wrench.stableNorm();
 }
@@ -57,11 +56,8 @@ double overallWeight(const Vector6& weights, double wrench_size, double weighted
   return wrench_size > 0. ? weighted_size / wrench_size : weights.maxCoeff();
 }
 
-// Whether two matrices have the same sizes and the same bits: −0 is another number than 0 here.
 bool areSame(const MatrixRef& a, const MatrixRef& b) {
-  if (a.rows() != b.rows() || a.cols() != b.cols()) return false;
-  if (a.size() == 0) return true;
-  return std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(double)) == 0;
+  return a.rows() == b.rows() && a.cols() == b.cols() && a == b;
 }
 
 void requireInitialised(const ContactBase& contact) {
@@ -202,6 +198,7 @@ struct WrenchDistribution::Workspace {
     // As last added: inequalities in two parts, those of a contact.
     Eigen::MatrixXd unilaterality, friction;
     Eigen::VectorXd weights;
+    std::uint64_t revision = 0;  // of the contact, if it was one
     NewtonEuler NE;
     bool changed = true;      // whether the last solve() knew other inequalities and weights
     std::size_t problem = 0;  // the last that it was added to
@@ -233,6 +230,7 @@ struct WrenchDistribution::Workspace {
 
   Slot& findSlot(std::size_t slot);
   Slot& takeSlot(std::size_t slot);
+  void describe(Slot& slot, const ContactBase& contact);
   void describe(Slot& slot, const MatrixRef& unilaterality, const MatrixRef& friction,
                 const VectorRef& weights);
   void reserve();
@@ -318,8 +316,15 @@ WrenchDistribution::Workspace::Slot& WrenchDistribution::Workspace::takeSlot(std
 }
 
 // What is the same as before is not written: this happens at every tick.
+void WrenchDistribution::Workspace::describe(Slot& slot, const ContactBase& contact) {
+  if (slot.revision == contact.getRevision()) return;
+  describe(slot, contact.uni_A(), contact.fri_A(), contact.reg_A());
+  slot.revision = contact.getRevision();
+}
+
 void WrenchDistribution::Workspace::describe(Slot& slot, const MatrixRef& unilaterality,
                                              const MatrixRef& friction, const VectorRef& weights) {
+  slot.revision = 0;
   if (areSame(slot.unilaterality, unilaterality) && areSame(slot.friction, friction) &&
       areSame(slot.weights, weights))
     return;
@@ -354,7 +359,7 @@ void WrenchDistribution::Workspace::reserve() {
 
 void WrenchDistribution::reserve(const ContactBase& contact, std::size_t slot) {
   requireInitialised(contact);
-  work_->describe(work_->findSlot(slot), contact.uni_A(), contact.fri_A(), contact.reg_A());
+  work_->describe(work_->findSlot(slot), contact);
 }
 
 void WrenchDistribution::add(const ContactBase& contact) { add(contact, work_->added.size()); }
@@ -365,7 +370,7 @@ void WrenchDistribution::add(const ContactBase& contact, std::size_t slot) {
     throw NotReadyError("contact '" + contact.getFrameName() +
                         "' is used before updateNewtonEuler()");
   Workspace::Slot& taken = work_->takeSlot(slot);
-  work_->describe(taken, contact.uni_A(), contact.fri_A(), contact.reg_A());
+  work_->describe(taken, contact);
   taken.NE = contact.ne_A();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <pinocchio/spatial.hpp>
@@ -78,6 +79,10 @@ class DYNACOM_EXPORT ContactBase {
   const Eigen::VectorXd& reg_A() const { return reg_A_; }
   const Eigen::VectorXd& reg_b() const { return reg_b_; }
 
+  /// Number of these matrices, but for ne_A(): another one whenever they may have changed, and no
+  /// other contact's unless they are copies of each other; 0 before there are any.
+  std::uint64_t getRevision() const { return revision_; }
+
   /// Newton–Euler matrix, 6 × cols(), at the pose and the CoM of the last updateNewtonEuler(): it
   /// takes λ to the wrench (force, moment) about the CoM in the world's axes.
   const Eigen::Matrix<double, 6, Eigen::Dynamic>& ne_A() const { return ne_A_; }
@@ -129,14 +134,21 @@ class DYNACOM_EXPORT ContactBase {
   /// getFrictionUsage().
   double getUsage(double tangential, double coefficient) const;
 
-  /// Gives the matrices their sizes, forgets frame index and force. For initialize().
-  /// @throws std::invalid_argument unless cols is 3, a force, or 6, a force and a moment
-  void reset(Eigen::Index uni_rows, Eigen::Index fri_rows, Eigen::Index cols);
+  /// Gives the contact its matrices; what else it has stays, unless cols() has changed.
+  /// @param uni_A, fri_A  uni_A() and fri_A(), as many columns as reg_A has components
+  /// @param reg_A         reg_A(): 3 weights, of a force, or 6, of a force and a moment
+  /// @throws std::invalid_argument if the sizes are others
+  void setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
+                   const Eigen::Ref<const Eigen::MatrixXd>& fri_A,
+                   const Eigen::Ref<const Eigen::VectorXd>& reg_A);
 
-  Eigen::MatrixXd uni_A_, fri_A_;
-  Eigen::VectorXd reg_A_;
+  /// Forgets frame index, force and ne_A(). For initialize(), after setMatrices().
+  void reset();
 
  private:
+  Eigen::MatrixXd uni_A_, fri_A_;
+  Eigen::VectorXd reg_A_;
+  std::uint64_t revision_ = 0;
   Eigen::VectorXd uni_b_, fri_b_, reg_b_;  // zeros: only cones can be projected on
   Eigen::Matrix<double, 6, Eigen::Dynamic> ne_A_;
   FrameIndex frame_id_ = kUnknownFrame;
