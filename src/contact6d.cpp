@@ -99,18 +99,18 @@ void Contact6D::updateMatrices() {
   const double dy = settings_.half_width;
   Eigen::Matrix<double, 5, 6> uni_A;
   uni_A << 0., 0., -1., 0., 0., 0.,  //
-      0., 0., -dx, 0., -1., 0.,       //
-      0., 0., -dy, 1., 0., 0.,        //
-      0., 0., -dx, 0., 1., 0.,        //
+      0., 0., -dx, 0., -1., 0.,      //
+      0., 0., -dy, 1., 0., 0.,       //
+      0., 0., -dx, 0., 1., 0.,       //
       0., 0., -dy, -1., 0., 0.;
   const double mu = settings_.mu;
   const double gu = settings_.gu;
   Eigen::Matrix<double, 6, 6> fri_A;
   fri_A << 1., 0., -mu, 0., 0., 0.,  //
-      0., 1., -mu, 0., 0., 0.,        //
-      -1., 0., -mu, 0., 0., 0.,       //
-      0., -1., -mu, 0., 0., 0.,       //
-      0., 0., -gu, 0., 0., 1.,        //
+      0., 1., -mu, 0., 0., 0.,       //
+      -1., 0., -mu, 0., 0., 0.,      //
+      0., -1., -mu, 0., 0., 0.,      //
+      0., 0., -gu, 0., 0., 1.,       //
       0., 0., -gu, 0., 0., -1.;
   setMatrices(uni_A, fri_A, settings_.weights);
 }

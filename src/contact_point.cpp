@@ -76,8 +76,8 @@ void ContactPoint::updateMatrices() {
   const Eigen::RowVector3d uni_A(0., 0., -1.);
   Eigen::Matrix<double, 4, 3> fri_A;
   fri_A << 1., 0., -mu,  //
-      0., 1., -mu,        //
-      -1., 0., -mu,       //
+      0., 1., -mu,       //
+      -1., 0., -mu,      //
       0., -1., -mu;
   setMatrices(uni_A, fri_A, settings_.weights);
 }

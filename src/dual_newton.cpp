@@ -178,6 +178,7 @@ void DualNewton::setContact(std::size_t slot, const Contact& contact) {
   block.reaches[BoxCone::kNormal] = 1.;
   block.last = block.free;
   block.e.setZero();
+  block.has_pure_moments = false;
   block.state = State();
   block.is_free.setZero();
   block.edge.setZero();
@@ -261,7 +262,8 @@ DualNewton::State DualNewton::findState(const Block& block, const Vector6& pull)
   return state;
 }
 
-EIGEN_STRONG_INLINE DualNewton::Vector6 DualNewton::pullOf(const Block& block, const Vector6& multipliers) {
+EIGEN_STRONG_INLINE DualNewton::Vector6 DualNewton::pullOf(const Block& block,
+                                                           const Vector6& multipliers) {
   Vector6 pull = Vector6::Zero();
   withSize(block.cone.size, [&](auto size) {
     pull.template head<size>().noalias() =
@@ -275,7 +277,8 @@ DualNewton::Vector6 DualNewton::respond(const Block& block, const Vector6& pull)
   return block.is_free.cwiseProduct(pull) + block.edge.dot(pull) * block.edge;
 }
 
-EIGEN_STRONG_INLINE void DualNewton::addWrench(const Block& block, const Vector6& force, Vector6& wrench) {
+EIGEN_STRONG_INLINE void DualNewton::addWrench(const Block& block, const Vector6& force,
+                                               Vector6& wrench) {
   withSize(block.cone.size, [&](auto size) {
     wrench.noalias() += block.e.template leftCols<size>() * force.template head<size>();
   });
@@ -339,31 +342,39 @@ DualNewton::Vector6 DualNewton::normalWrench(const Block& block) {
 // How the wrench rises with its multipliers, as long as the state stays: the lower half.
 void DualNewton::assembleCompliance() {
   Matrix6 compliance = Matrix6::Zero();
-  // Vectors v of the sum of v vᵀ, two at a time: what is summed up is read and written half as often.
-  const double* waiting = nullptr;
-  const auto add = [&](const double* vector) {
+  // Vectors v of the sum of v vᵀ, two at a time: what is summed up is read and written half as
+  // often. Those of pure moments, of which the upper half is zero, on their own.
+  const auto add = [&](const double* vector, const double*& waiting, auto first_row) {
     if (!waiting) {
       waiting = vector;
       return;
     }
     const Eigen::Map<const Vector6> a(waiting), b(vector);
+    waiting = nullptr;
     unroll6([&](auto column) {
       constexpr int j = column, segment = 6 - j / 2 * 2;  // packets of two begin at even rows
-      compliance.col(j).template tail<segment>() +=
-          a[j] * a.template tail<segment>() + b[j] * b.template tail<segment>();
+      if constexpr (j >= first_row)
+        compliance.col(j).template tail<segment>() +=
+            a[j] * a.template tail<segment>() + b[j] * b.template tail<segment>();
     });
-    waiting = nullptr;
   };
+  const double *force = nullptr, *moment = nullptr;
+  const std::integral_constant<int, 0> of_force;
+  const std::integral_constant<int, 3> of_moment;
   for (const std::size_t slot : active_) {
     Block& block = blocks_[slot];
     if (!block.state.loaded) continue;
     block.normal_wrench = normalWrench(block);
-    add(block.normal_wrench.data());
-    for (int i = 0; i < block.cone.size; ++i)
-      if (block.is_free[i] != 0.) add(block.e.col(i).data());
+    add(block.normal_wrench.data(), force, of_force);
+    const int forces = block.has_pure_moments ? 3 : block.cone.size;
+    for (int i = 0; i < forces; ++i)
+      if (block.is_free[i] != 0.) add(block.e.col(i).data(), force, of_force);
+    for (int i = forces; i < block.cone.size; ++i)
+      if (block.is_free[i] != 0.) add(block.e.col(i).data(), moment, of_moment);
   }
   const Vector6 nothing = Vector6::Zero();
-  if (waiting) add(nothing.data());
+  if (force) add(nothing.data(), force, of_force);
+  if (moment) add(nothing.data(), moment, of_moment);
   compliance_ = compliance;
 }
 
@@ -594,20 +605,22 @@ bool DualNewton::isFinite() const {
   return std::isfinite(sum);
 }
 
-DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const Vector6& wrench,
+DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const Vector6& target,
                                      const Vector6& wrench_weights, bool warm_start,
                                      int maximal_iterations) {
   iterations_ = 0;
   maximal_iterations_ = maximal_iterations;
   if (!recognised_) return DistributionStatus::NumericalFailure;
   weights_ = wrench_weights;
-  target_ = weights_.cwiseProduct(wrench);
+  target_ = target;
   for (std::size_t k = 0; k < active_.size(); ++k) {
     Block& block = blocks_[active_[k]];
     withSize(block.cone.size, [&](auto size) {
       const Eigen::Map<const Eigen::Matrix<double, 6, size>> NE(contacts[k].NE.data());
       for (int i = 0; i < size; ++i)
         block.e.col(i) = weights_.cwiseProduct(NE.col(i)) * block.inverse_weights[i];
+      if constexpr (size == 6)
+        block.has_pure_moments = NE.template topRightCorner<3, 3>().cwiseAbs().sum() == 0.;
     });
   }
 

@@ -86,12 +86,12 @@ class DualNewton {
 
   /// Finds the forces.
   /// @param contacts            those that take part, with the NE of now
-  /// @param wrench              w over the unit of force, not weighted
+  /// @param target              D w over its unit
   /// @param wrench_weights      D over its overall size
   /// @param warm_start          whether to start from the state of the last answer
   /// @param maximal_iterations  after how many to give up
   /// @return Solved, Relaxed, or NumericalFailure where another solver has to be asked
-  DistributionStatus solve(const std::vector<Contact>& contacts, const Vector6& wrench,
+  DistributionStatus solve(const std::vector<Contact>& contacts, const Vector6& target,
                            const Vector6& wrench_weights, bool warm_start, int maximal_iterations);
 
   /// Writes forces, multipliers and what they amount to into a result with these contacts.
@@ -108,7 +108,7 @@ class DualNewton {
   /// Whether a contact bears a load, and which of its components are at which bound, ±1.
   struct State {
     bool loaded = false;
-    std::array<signed char, 6> bounds = {};
+    std::array<signed char, 8> bounds = {};  // as many as compare at once
 
     bool operator==(const State& other) const {
       return loaded == other.loaded && (!loaded || bounds == other.bounds);
@@ -125,13 +125,14 @@ class DualNewton {
     Vector6 betas;                     // of x
     Vector6 reaches;                   // by which components are free; ∞ without extent
     Matrix6 e;                         // D NE W⁻¹
+    bool has_pure_moments;             // whether the moments give no force
     // The state with no component at its bound, but for those without extent; that at hand, and at
     // the last keepStates(); and the one that led to the last answer.
     State free, state, former, last;
     // In this state, forces that respond to a pull are its projection on the free components, and
     // on the direction in which those at their bounds go with the normal force.
     Vector6 is_free, edge;
-    Vector6 normal_wrench;     // of a normal force, and what goes with it, of unit cost
+    Vector6 normal_wrench;  // of a normal force, and what goes with it, of unit cost
     // Of the multipliers at hand: eᵀ ν, x(ν).
     Vector6 pull, force;
     // Of provesItself().

@@ -431,8 +431,8 @@ void WrenchDistribution::Workspace::rearrange() {
 // where the wrench is so close to the boundary that it is barely known which side it is on.
 // Returns false if there is no answer.
 bool WrenchDistribution::Workspace::distribute() {
-  result.status = newton.solve(result.contacts, result.wrench / unit, wrench_weights, warm_start,
-                               maximal_iterations);
+  result.status = newton.solve(result.contacts, weighted(settings, result.wrench) / result.scale,
+                               wrench_weights, warm_start, maximal_iterations);
   result.iterations = newton.iterations();
   if (result.status != DistributionStatus::NumericalFailure) {
     newton.writeAnswer(result, unit, overall_weight);
@@ -501,9 +501,10 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   result.wrench_weights = weights;
   const double weighted_size = normOf(weighted(weights, wrench));
   work.overall_weight = overallWeight(weights, normOf(wrench), weighted_size);
+  const double inverse_weight = 1. / work.overall_weight;
   result.scale = std::max(minimalScale * weights.head<3>().maxCoeff(), weighted_size);
-  work.unit = result.scale / work.overall_weight;
-  work.wrench_weights = weights / work.overall_weight;
+  work.unit = result.scale * inverse_weight;
+  work.wrench_weights = weights * inverse_weight;
   work.takeProblem();
 
   bool answered = false;
