@@ -215,17 +215,15 @@ void DualNewton::enter(Block& block, const State& state) {
   const bool same = state == block.state;
   block.state = state;  // where there is no load, bounds may differ
   if (same) return;
-  block.is_free.setZero();
-  block.edge.setZero();
-  if (!state.loaded) return;
-  for (int i = 0; i < block.cone.size; ++i) {
-    const signed char bound = state.bounds[static_cast<std::size_t>(i)];
+  for (int i = 0; i < 6; ++i) {
+    const int bound = state.loaded ? state.bounds[static_cast<std::size_t>(i)] : 1;
     block.is_free[i] = bound == 0 ? 1. : 0.;
-    block.edge[i] = bound * block.betas[i];
+    block.edge[i] = state.loaded ? bound * block.betas[i] : 0.;
   }
+  if (!state.loaded) return;
   block.is_free[kNormal] = 0.;
   block.edge[kNormal] = 1.;
-  block.edge.normalize();
+  block.edge /= block.edge.norm();
 }
 
 // The state that a pull wants. What x_z would have to be less,
@@ -234,31 +232,32 @@ void DualNewton::enter(Block& block, const State& state) {
 //
 // rises, ever less steeply: from zero on, where all that pull sideways are at their bounds,
 // Newton's method comes from the left, and lets go of one bound after the other.
-DualNewton::State DualNewton::findState(const Block& block, const Vector6& pull) {
-  State state;
-  double numerator = pull[kNormal], denominator = 1.;
-  for (int i = 0; i < block.cone.size; ++i) {
-    if (i == kNormal) continue;
-    const double beta = block.betas[i];
-    state.bounds[static_cast<std::size_t>(i)] = pull[i] < 0. && beta > 0. ? -1 : 1;
-    numerator += beta * std::abs(pull[i]);
-    denominator += beta * beta;
-  }
-  state.loaded = numerator > 0.;
-  if (!state.loaded) return state;
-  for (bool changed = true; changed;) {
-    const double normal = numerator / denominator;
-    changed = false;
-    for (int i = 0; i < block.cone.size; ++i) {
-      const double beta = block.betas[i];
-      signed char& bound = state.bounds[static_cast<std::size_t>(i)];
-      if (i == kNormal || bound == 0 || beta == 0. || std::abs(pull[i]) > beta * normal) continue;
-      bound = 0;
-      numerator -= beta * std::abs(pull[i]);
-      denominator -= beta * beta;
-      changed = true;
+template <int kSize>
+DualNewton::State DualNewton::findState(const Block& block) {
+  const Vector6& g = block.pull;
+  double normal = 0., held = std::numeric_limits<double>::infinity();
+  for (double former = held;; former = held) {
+    double numerator = g[kNormal], denominator = 1.;
+    held = 0.;
+    for (int i = 0; i < kSize; ++i) {
+      const double beta = block.betas[i], size = std::abs(g[i]);
+      const double is_held = size > beta * normal ? 1. : 0.;
+      numerator += is_held * beta * size;
+      denominator += is_held * beta * beta;
+      held += is_held;
     }
+    if (held >= former) break;  // less and less, but for rounding
+    normal = std::max(0., numerator / denominator);
   }
+  State state;
+  state.loaded = normal > 0.;
+  for (int i = 0; i < kSize; ++i) {
+    const double beta = block.betas[i];
+    const signed char side = g[i] < 0. && beta > 0. ? -1 : 1;
+    const bool is_held = beta == 0. || std::abs(g[i]) > beta * normal;
+    state.bounds[static_cast<std::size_t>(i)] = is_held ? side : 0;
+  }
+  state.bounds[kNormal] = 0;
   return state;
 }
 
@@ -299,7 +298,10 @@ bool DualNewton::evaluate() {
     const double normal = block.pull[kNormal];
     const bool inside =
         normal > 0. && (block.pull.cwiseAbs() - normal * block.reaches).maxCoeff() <= 0.;
-    enter(block, inside ? block.free : findState(block, block.pull));
+    if (inside)
+      enter(block, block.free);
+    else
+      withSize(block.cone.size, [&](auto size) { enter(block, findState<size>(block)); });
     block.force = respond(block, block.pull);
     addWrench(block, block.force, achieved_);
     changed = changed || !(block.state == block.former);

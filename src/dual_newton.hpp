@@ -140,7 +140,8 @@ class DualNewton {
   };
 
   static void enter(Block& block, const State& state);
-  static State findState(const Block& block, const Vector6& pull);
+  template <int kSize>
+  static State findState(const Block& block);
   static Vector6 respond(const Block& block, const Vector6& pull);
   static Vector6 pullOf(const Block& block, const Vector6& multipliers);
   static void addWrench(const Block& block, const Vector6& force, Vector6& wrench);

@@ -446,6 +446,8 @@ bool WrenchDistribution::Workspace::distribute() {
   if (answered && !solver.hasFewDigits() && result.isOptimal(kProof)) return true;
   const DistributionStatus status = result.status;
   if (distributeBy(accurate_solver)) return true;
+  // An answer without proof is one if there is none better, but not if there was no time for it.
+  if (result.iterations >= maximal_iterations) return false;
   result.status = status;
   return answered;
 }

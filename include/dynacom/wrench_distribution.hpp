@@ -119,7 +119,7 @@ class DYNACOM_EXPORT WrenchDistribution {
  public:
   using Vector6 = DistributionResult::Vector6;
 
-  static constexpr int kMaximalIterations = 10000;
+  static constexpr int kMaximalIterations = 100000;
 
   WrenchDistribution();
   WrenchDistribution(const WrenchDistribution& other);
