@@ -17,10 +17,10 @@ constexpr int kNormal = BoxCone::kNormal;
 // How many steps are taken without ε before the one with.
 constexpr int kFreeSteps = 6;
 // ε, as a part of the mean compliance: less, if the answer that it leads to is none.
-constexpr double kSlacks[] = {1e-5, 1e-8, 1e-11};
+constexpr double kSlacks[] = {1e-3, 1e-5, 1e-8, 1e-11};
 constexpr int kMaximalSteps = 50;
 // Along a step, what part of the slope at its start is as good as none.
-constexpr double kFlat = 0.3;
+constexpr double kFlat = 0.6;
 // How often a step is cut, and how often until it is enough to have come to another state.
 constexpr int kMaximalCuts = 30;
 constexpr int kEasyCuts = 3;
@@ -462,19 +462,18 @@ DistributionStatus DualNewton::finish() {
 
   if (rank_ < 6) {
     // The closest wrench is the projection on what the directions span.
-    const auto range = range_.leftCols(rank_);
-    missing_ = target_ - range * (range.transpose() * target_);
-    missing_ -= range * (range.transpose() * missing_);
+    missing_ = target_ - projectOnRange(target_);
+    missing_ -= projectOnRange(missing_);
     const double distance = missing_.norm();
     if (distance <= kReached)
       missing_.setZero();
     else if (distance < kFar * weights_.maxCoeff() / weights_.minCoeff())
       return DistributionStatus::NumericalFailure;
-    Matrix6 reduced = Matrix6::Identity();
-    reduced.topLeftCorner(rank_, rank_).noalias() =
-        range.transpose() * compliance_.selfadjointView<Eigen::Lower>() * range;
+    compliance_.triangularView<Eigen::StrictlyUpper>() = compliance_.transpose();
+    Matrix6 reduced = range_.transpose() * (compliance_ * range_);
+    reduced.diagonal().tail(6 - rank_).setOnes();
     factors_.compute(reduced);
-    restart(range * (range.transpose() * multipliers_));
+    restart(projectOnRange(multipliers_));
   }
   const Vector6 closest = target_ - missing_;
   const bool reached = missing_.isZero(0.);
@@ -485,17 +484,19 @@ DistributionStatus DualNewton::finish() {
   return reached ? DistributionStatus::Solved : DistributionStatus::Relaxed;
 }
 
+DualNewton::Vector6 DualNewton::projectOnRange(const Vector6& wrench) const {
+  return range_ * (range_.transpose() * wrench);
+}
+
 // The multipliers that change the wrench by as much, of those in the range.
 DualNewton::Vector6 DualNewton::solveRange(const Vector6& wrench) const {
   if (rank_ == 6) return factors_.solve(wrench);
-  Vector6 coordinates = Vector6::Zero();
-  coordinates.head(rank_).noalias() = range_.leftCols(rank_).transpose() * wrench;
-  coordinates = factors_.solve(coordinates);
-  return range_.leftCols(rank_) * coordinates.head(rank_);
+  return range_ * factors_.solve(range_.transpose() * wrench);
 }
 
 // An orthonormal basis of the wrenches that the state can give, whatever it costs: one direction
-// after the other, of which the most is new. Returns false if the rank is not certain.
+// after the other, of which the most is new; and zeros behind. Returns false if the rank is not
+// certain.
 bool DualNewton::findRange() {
   directions_.clear();
   for (const std::size_t slot : active_) {
@@ -505,6 +506,7 @@ bool DualNewton::findRange() {
     for (int i = 0; i < block.cone.size; ++i)
       if (block.is_free[i] != 0.) directions_.push_back(block.e.col(i).normalized());
   }
+  range_.setZero();
   for (rank_ = 0; rank_ < 6; ++rank_) {
     double most = 0.;
     for (const Vector6& direction : directions_) {
@@ -514,7 +516,10 @@ bool DualNewton::findRange() {
       range_.col(rank_) = direction;
     }
     most = std::sqrt(most);
-    if (most <= kDependent) return true;
+    if (most <= kDependent) {
+      range_.col(rank_).setZero();
+      return true;
+    }
     if (most < kIndependent) return false;
     auto basis = range_.col(rank_);
     for (int k = 0; k < rank_; ++k) basis -= range_.col(k).dot(basis) * range_.col(k);

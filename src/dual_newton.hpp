@@ -161,6 +161,7 @@ class DualNewton {
   DistributionStatus search(bool from_last_answer);
   void settle();
   bool findRange();
+  Vector6 projectOnRange(const Vector6& wrench) const;
   Vector6 solveRange(const Vector6& wrench) const;
   DistributionStatus finish();
   bool provesItself();
