@@ -13,6 +13,7 @@
 
 namespace dynacom {
 
+using internal::areFinite;
 using internal::kNaN;
 using internal::throwInvalid;
 
@@ -141,7 +142,7 @@ void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const Vect
   requireInitialized();
   updateFrames();
   const CentroidalState state = computeCentroidalState(model_, data_, q, v, a);
-  const bool finite = q.allFinite() && v.allFinite() && a.allFinite();
+  const bool finite = areFinite(q) && areFinite(v) && areFinite(a);
   takeMotion(state, finite, extWrench, flatHorizontalGround);
 }
 
