@@ -17,7 +17,11 @@ def run(*command):
 
 
 def test_there_are_examples():
-    assert [path.stem for path in EXAMPLES] == ["01_centroidal_wrench", "02_force_distribution"]
+    assert [path.stem for path in EXAMPLES] == [
+        "01_centroidal_wrench",
+        "02_force_distribution",
+        "03_control_loop",
+    ]
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
