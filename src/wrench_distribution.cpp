@@ -201,6 +201,7 @@ struct WrenchDistribution::Workspace {
     std::uint64_t revision = 0;  // of the contact, if it was one
     NewtonEuler NE;
     bool changed = true;      // whether the last solve() knew other inequalities and weights
+    bool moved = false;       // whether it knew another NE
     std::size_t problem = 0;  // the last that it was added to
     bool in_result = false;   // whether it was part of the last solve()
     Contact parked;           // its share of the result while it was not
@@ -372,6 +373,7 @@ void WrenchDistribution::add(const ContactBase& contact, std::size_t slot) {
   Workspace::Slot& taken = work_->takeSlot(slot);
   work_->describe(taken, contact);
   taken.NE = contact.ne_A();
+  taken.moved = true;
 }
 
 void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
@@ -387,6 +389,7 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
   const Eigen::MatrixXd no_friction(0, A.cols());
   work_->describe(taken, A, no_friction, weights);
   taken.NE = NE;
+  taken.moved = true;
 }
 
 // The contacts that were added become those of the result, which keeps its forces if only their
@@ -405,7 +408,8 @@ void WrenchDistribution::Workspace::takeProblem() {
       newton.setContact(solved[k], contact);
       slot.changed = same = false;
     }
-    contact.NE.swap(slot.NE);
+    if (slot.moved) contact.NE.swap(slot.NE);
+    slot.moved = false;
   }
   if (same) return;
   has_answer = false;

@@ -23,10 +23,8 @@ class SuctionCup : public ContactBase {
  public:
   SuctionCup() { initialize(); }
   void initialize() {
-    reset(1, 2, 6);
-    uni_A_ << 0, 0, 0, 0, 0, 1;
-    fri_A_.setOnes();
-    reg_A_.setConstant(3.);
+    setMatrices(Eigen::RowVectorXd::Unit(6, 5), MatrixXd::Ones(2, 6), Vector6::Constant(3.));
+    reset();
   }
   std::shared_ptr<ContactBase> clone() const override {
     return std::make_shared<SuctionCup>(*this);

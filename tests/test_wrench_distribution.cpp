@@ -366,9 +366,9 @@ Contacts twoSoles() { return {makeSole({0., 0.1, 0.}), makeSole({0., -0.1, 0.})}
 class Hook : public ContactBase {
  public:
   explicit Hook(Index cols) {
-    reset(1, 0, cols);
-    uni_A_(0, 2) = -1.;
-    reg_A_.setOnes();
+    MatrixXd uni_A = MatrixXd::Zero(1, cols);
+    if (cols > 2) uni_A(0, 2) = -1.;
+    setMatrices(uni_A, MatrixXd(0, cols), VectorXd::Ones(cols));
   }
   std::shared_ptr<ContactBase> clone() const override { return std::make_shared<Hook>(*this); }
   const std::string& getFrameName() const override { return name_; }
@@ -381,13 +381,13 @@ class Hook : public ContactBase {
 class Hand : public ContactBase {
  public:
   Hand(Random& random, const VectorXd& inside) {
-    reset(4, 4, 6);
-    for (MatrixXd* block : {&uni_A_, &fri_A_})
+    MatrixXd uni_A(4, 6), fri_A(4, 6);
+    for (MatrixXd* block : {&uni_A, &fri_A})
       for (Index i = 0; i < 4; ++i) {
         block->row(i) = random.vector(6).transpose();
         if (block->row(i).dot(inside) > 0.) block->row(i) *= -1.;
       }
-    reg_A_ = randomWeights(random, 6);
+    setMatrices(uni_A, fri_A, randomWeights(random, 6));
     updateNewtonEuler(random.vector3(), random.placement());
   }
   std::shared_ptr<ContactBase> clone() const override { return std::make_shared<Hand>(*this); }
@@ -831,9 +831,9 @@ BOOST_AUTO_TEST_CASE(any_cone_is_taken_with_its_own_inequalities) {
 }
 
 BOOST_AUTO_TEST_CASE(contacts_of_other_kinds_are_forces_or_wrenches) {
-  for (const Index cols : {-1, 0, 1, 2, 4, 5, 7})
+  for (const Index cols : {0, 1, 2, 4, 5, 7})
     BOOST_TEST(throws<std::invalid_argument>([cols = cols] { Hook hook(cols); },
-                                             {"cols", std::to_string(cols).c_str()}));
+                                             {"reg_A", std::to_string(cols).c_str()}));
   for (const Index cols : {3, 6}) {
     // Nothing but a pull upwards, whatever the other components are.
     WrenchDistribution distribution;
