@@ -15,9 +15,9 @@ constexpr int kNormal = BoxCone::kNormal;
 // All of these are for a problem whose weighted wrench has unit size.
 
 // How many steps are taken without ε before the one with.
-constexpr int kFreeSteps = 6;
+constexpr int kFreeSteps = 3;
 // ε, as a part of the mean compliance: less, if the answer that it leads to is none.
-constexpr double kSlacks[] = {1e-3, 1e-5, 1e-8, 1e-11};
+constexpr double kSlacks[] = {1e-3, 1e-4, 1e-6, 1e-8, 1e-11};
 constexpr int kMaximalSteps = 50;
 // Along a step, what part of the slope at its start is as good as none.
 constexpr double kFlat = 0.6;
