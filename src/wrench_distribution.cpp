@@ -447,11 +447,14 @@ bool WrenchDistribution::Workspace::distribute() {
     return false;
   }
   const bool answered = distributeBy(solver);
-  if (answered && !solver.hasFewDigits() && result.isOptimal(kProof)) return true;
+  const bool proved = answered && result.isOptimal(kProof);
+  if (proved && !solver.hasFewDigits()) return true;
   const DistributionStatus status = result.status;
-  if (distributeBy(accurate_solver)) return true;
+  const bool answered_accurately = distributeBy(accurate_solver);
+  if (answered_accurately && (!proved || result.isOptimal(kProof))) return true;
   // An answer without proof is one if there is none better, but not if there was no time for it.
   if (result.iterations >= maximal_iterations) return false;
+  if (answered_accurately) return distributeBy(solver);
   result.status = status;
   return answered;
 }
