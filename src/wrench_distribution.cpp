@@ -400,7 +400,7 @@ void WrenchDistribution::Workspace::takeProblem() {
       newton.setContact(solved[k], contact);
       slot.changed = same = false;
     }
-    contact.NE.swap(slot.NE);
+    contact.NE = slot.NE;
   }
   if (same) return;
   has_answer = false;
