@@ -37,6 +37,7 @@ from helpers import (
     point,
     random_configuration,
     random_humanoid,
+    random_pose,
     random_tree,
     reference_configuration,
     robots_folder,
@@ -1138,6 +1139,11 @@ def test_data_that_is_not_finite(robot, argument, value, flat):
 # Contacts where they were measured.
 
 
+def somewhere(seed: int) -> pin.SE3:
+    """Within a metre of the world's origin, and not too steep to stand on."""
+    return random_pose(np.random.default_rng(seed), tilt=0.6)
+
+
 def moved(pose: pin.SE3, rng: np.random.Generator) -> pin.SE3:
     """Elsewhere by some centimetres, and turned by some degrees."""
     return pose * pin.SE3(pin.exp3(rng.uniform(-0.2, 0.2, 3)), rng.uniform(-0.05, 0.05, 3))
@@ -1191,6 +1197,22 @@ def test_forces_about_displaced_feet(talos, talos_standing, way):
         for name, pose in measured.items():
             assert robot.getContact(name).getPose() == pose
             assert_within_cones(robot.getContact(name), tolerance)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_measured_poses_and_another_centre_of_mass(robot, moving):
+    """That of the call counts, not that of a motion, which there need not be."""
+    if moving:
+        robot.computeDynamics(*motion(robot.getModel(), 0))
+    poses = {name: somewhere(seed) for seed, name in enumerate("ab")}
+    for name, pose in poses.items():
+        robot.setContactPose(name, pose)
+    com = np.array([0.3, -0.2, 0.9])
+    robot.distributeForce(G * robot.getMass() * UP, np.zeros(3), com)
+    result, forces = robot.getDistribution(), forces_of(robot)
+    given = wrench_from(forces, poses, com)
+    assert np.linalg.norm(given) > 1.0
+    assert_allclose(given, result.achieved, rtol=0, atol=1e-9 * result.scale)
 
 
 def test_centre_of_pressure_of_displaced_feet(talos, talos_standing):
@@ -1265,7 +1287,7 @@ LASTING = {
         robot.getModel(), robot.getData(), random_configuration(robot.getModel(), 1)
     ),
     "activated again": lambda robot: (robot.deactivateContact("a"), robot.activateContact("a")),
-    "another one": lambda robot: robot.setContactPose("b", pin.SE3.Random()),
+    "another one": lambda robot: robot.setContactPose("b", somewhere(1)),
     "another one reset": lambda robot: robot.resetContactPose("b"),
     "an invalid motion": lambda robot: robot.computeDynamics(
         np.full(robot.getModel().nq, np.nan), *motion(robot.getModel(), 1)[1:]
@@ -1280,7 +1302,7 @@ def test_measured_poses_last(robot, event):
     """Until they are reset, whatever happens."""
     model = robot.getModel()
     robot.computeDynamics(*motion(model, 0))
-    pose = pin.SE3.Random()
+    pose = somewhere(0)
     robot.setContactPose("a", pose)
     assert_stands_at(robot, "a", pose)
     LASTING[event](robot)
@@ -1300,7 +1322,7 @@ def test_poses_that_are_reset(robot, way):
     """By the model again, from the next call on that places contacts; twice does no harm."""
     model = robot.getModel()
     robot.computeDynamics(*motion(model, 0))
-    pose = pin.SE3.Random()
+    pose = somewhere(0)
     robot.setContactPose("a", pose)
     distribute(robot)
     for _ in range(2):
@@ -1320,7 +1342,7 @@ def test_poses_that_were_never_measured_stay_the_model_s(robot):
     for name in "abc":
         robot.resetContactPose(name)
     assert_same(state(robot), before)
-    robot.setContactPose("a", pin.SE3.Random())
+    robot.setContactPose("a", somewhere(1))
     for name in "bc":
         assert_array_equal(
             robot.getContact(name).getPose().homogeneous, before[f"{name}.pose"], name
@@ -1329,8 +1351,8 @@ def test_poses_that_were_never_measured_stay_the_model_s(robot):
 
 def test_poses_measured_again(robot):
     robot.computeDynamics(*motion(robot.getModel(), 0))
-    pose = pin.SE3.Random()
-    robot.setContactPose("a", pin.SE3.Random())
+    pose = somewhere(0)
+    robot.setContactPose("a", somewhere(1))
     robot.setContactPose("a", pose)
     distribute(robot)
     assert_stands_at(robot, "a", pose)
@@ -1338,7 +1360,7 @@ def test_poses_measured_again(robot):
 
 def test_poses_measured_before_the_motion(robot):
     """And of a contact that is not active yet."""
-    poses = {name: pin.SE3.Random() for name in "ac"}
+    poses = {name: somewhere(seed) for seed, name in enumerate("ac")}
     for name, pose in poses.items():
         robot.setContactPose(name, pose)
         assert robot.getContact(name).getPose() == pose
@@ -1357,11 +1379,11 @@ def test_copies_keep_measured_poses(robot, copied):
     """Each its own: what one measures from then on is nothing to the other."""
     model = robot.getModel()
     robot.computeDynamics(*motion(model, 0))
-    pose = pin.SE3.Random()
+    pose = somewhere(0)
     robot.setContactPose("a", pose)
     other = copied(robot)
     robot.resetContactPose("a")
-    other.setContactPose("b", pin.SE3.Random())
+    other.setContactPose("b", somewhere(1))
     for dynamics in (robot, other):
         dynamics.computeDynamics(*motion(model, 1))
         distribute(dynamics)
@@ -1376,7 +1398,7 @@ def test_copies_keep_measured_poses(robot, copied):
 
 def test_measured_poses_are_copies(robot):
     robot.computeDynamics(*motion(robot.getModel(), 0))
-    pose = pin.SE3.Random()
+    pose = somewhere(0)
     given = pose.copy()
     robot.setContactPose("a", given)
     given.translation = np.zeros(3)
@@ -1390,12 +1412,12 @@ def test_removed_contacts_forget_where_they_were_measured(robot):
     """As do all, when the robot is initialised again."""
     model = robot.getModel()
     contact = robot.getContact("a")
-    robot.setContactPose("a", pin.SE3.Random())
+    robot.setContactPose("a", somewhere(1))
     robot.removeContact("a")
     robot.addContact(contact, "a")
     robot.computeDynamics(*motion(model, 0))
     assert_stands_at(robot, "a", modelled(robot, "a", motion(model, 0)[0]))
-    robot.setContactPose("a", pin.SE3.Random())
+    robot.setContactPose("a", somewhere(1))
     robot.initialize(pin.Model(model))
     robot.addContact(contact, "a")
     robot.computeDynamics(*motion(model, 0))
