@@ -30,9 +30,15 @@ void exposeMotion();
 /// overloads.
 Eigen::VectorXd toNumbers(const char* name, const bp::object& values, int size);
 
+/// Where an array of that many numbers holds them, if they lie there one after the other as double,
+/// as in nearly all that come in; else null. Spares them Boost.Python's converters, and storage.
+const double* findNumbers(const bp::object& values, int size);
+
 /// A vector of a fixed size. Boost.Python would refuse one of another size without naming it.
 template <int size>
 Eigen::Matrix<double, size, 1> toVector(const char* name, const bp::object& values) {
+  if (const double* numbers = findNumbers(values, size))
+    return Eigen::Map<const Eigen::Matrix<double, size, 1>>(numbers);
   const Eigen::VectorXd numbers = toNumbers(name, values, size);
   internal::requireSize(name, numbers.size(), Eigen::Index(size), "components");
   return numbers;

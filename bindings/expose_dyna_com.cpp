@@ -34,6 +34,11 @@ void computeDynamics(DynaCoM& self, const VectorRef& q, const VectorRef& v, cons
   self.computeDynamics(q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
+void computeDynamicsOfData(DynaCoM& self, const pinocchio::Data& data, const bp::object& ext_wrench,
+                           bool flat_horizontal_ground) {
+  self.computeDynamics(data, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
+}
+
 void computeNL(DynaCoM& self, double omega, const VectorRef& q, const VectorRef& v,
                const VectorRef& a, const bp::object& ext_wrench, bool flat_horizontal_ground) {
   self.computeNL(omega, q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
@@ -103,6 +108,17 @@ void exposeDynaCoM() {
           "setWrenchWeights", method<DynaCoM>(&DynaCoM::setWrenchWeights, "weights"),
           "Three of the force, three of the moment [1/m]; all 1 by default. ValueError unless all\n"
           "are finite and > 0.")
+      .def("getWarmStart", &DynaCoM::getWarmStart, bp::arg("self"),
+           "Whether a distribution starts from the inequalities that were active in the last one,\n"
+           "contact by contact; True by default.")
+      .def("setWarmStart", &DynaCoM::setWarmStart, (bp::arg("self"), bp::arg("warmStart")),
+           "Whether it does, see WrenchDistribution.setWarmStart().")
+      .def("getMaximalIterations", &DynaCoM::getMaximalIterations, bp::arg("self"),
+           "How many iterations a distribution may take.")
+      .def("setMaximalIterations", &DynaCoM::setMaximalIterations,
+           (bp::arg("self"), bp::arg("maximalIterations")),
+           "How many it may take, see WrenchDistribution.setMaximalIterations(). ValueError\n"
+           "unless maximalIterations > 0.")
 
       .def("computeDynamics", &computeDynamics,
            (bp::arg("self"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
@@ -114,6 +130,18 @@ void exposeDynaCoM() {
            "so.\n\n"
            "q: (nq,); v: (nv,); a: (nv,); extWrench: (6,), force [N] and moment [N·m] about the\n"
            "centre of mass. Raises ValueError if one has another size.")
+      .def(
+          "computeDynamics", &computeDynamicsOfData,
+          (bp::arg("self"), bp::arg("data"), bp::arg("extWrench") = no_wrench,
+           bp::arg("flatHorizontalGround") = true),
+          "The same for a motion of which all that Pinocchio computes is known:\n"
+          "pinocchio.computeCentroidalMomentumTimeVariation(getModel(), data, q, v, a) has run\n"
+          "on data (pinocchio.Data), and nothing since that changes its com, vcom, hg, dhg, mass\n"
+          "or oMi. Those are read, and oMi is copied to getData(), so that contacts can be placed\n"
+          "later; nothing else in getData() is that of the motion.\n\n"
+          "Raises ValueError if data has another number of joints, or extWrench another size;\n"
+          "NotReadyError if data's mass is not the robot's, because that algorithm has never run\n"
+          "on it.")
       .def("getGroundCoMForce", &DynaCoM::getGroundCoMForce, bp::arg("self"), Copied(),
            "Force that the ground must give, (3,) [N].")
       .def("getGroundCoMTorque", &DynaCoM::getGroundCoMTorque, bp::arg("self"), Copied(),
@@ -170,6 +198,16 @@ void exposeDynaCoM() {
            "Another name of activateContact.")
       .def("deactivateContact6d", &DynaCoM::deactivateContact6d, (bp::arg("self"), bp::arg("name")),
            "Another name of deactivateContact.")
+      .def("setContactPose", &DynaCoM::setContactPose,
+           (bp::arg("self"), bp::arg("name"), bp::arg("oMs")),
+           "Places a contact's frame where it was measured, wherever the model says that it is:\n"
+           "from now on, until it is set again or resetContactPose(). Raises ValueError if the\n"
+           "name is not known.\n\n"
+           "oMs: placement of the contact's frame in the world (pinocchio.SE3); see\n"
+           "ContactBase.getSurfacePose().")
+      .def("resetContactPose", &DynaCoM::resetContactPose, (bp::arg("self"), bp::arg("name")),
+           "Places a contact by the model again, from the next computeDynamics() or\n"
+           "distributeForce() on. Raises ValueError if the name is not known.")
       .def("getContact", &getContact, (bp::arg("self"), bp::arg("name")),
            "The contact of that name. Raises ValueError if it is not known.")
       .def("getActiveContacts", &getActiveContacts, bp::arg("self"),
@@ -177,15 +215,14 @@ void exposeDynaCoM() {
       .def("getKnownContacts", &getKnownContacts, bp::arg("self"),
            "Names of all contacts: the active ones, then the others.")
 
-      .def(
-          "distributeForce", &distributeForce,
-          (bp::arg("self"), bp::arg("groundCoMForce"), bp::arg("groundCoMTorque"), bp::arg("com")),
-          "Shares a wrench between the active contacts, placed by getData(): the cheapest forces\n"
-          "within all inequalities that give it, (9-13), or the closest that they can give. Each\n"
-          "contact is given its force. Returns the DistributionStatus; getDistribution() has all.\n"
-          "\n"
-          "groundCoMForce: (3,) [N]; groundCoMTorque: (3,), about the centre of mass [N·m];\n"
-          "com: (3,), that of getCoM(), or getFeasibleAMVariation() means nothing [m].")
+      .def("distributeForce", &distributeForce,
+           (bp::arg("self"), bp::arg("groundCoMForce"), bp::arg("groundCoMTorque"), bp::arg("com")),
+           "Shares a wrench between the active contacts, placed by getData() or setContactPose():\n"
+           "the cheapest forces within all inequalities that give it, (9-13), or the closest that\n"
+           "they can give. Each contact is given its force. Returns the DistributionStatus;\n"
+           "getDistribution() has all.\n\n"
+           "groundCoMForce: (3,) [N]; groundCoMTorque: (3,), about the centre of mass [N·m];\n"
+           "com: (3,), that of getCoM(), or getFeasibleAMVariation() means nothing [m].")
       .def(
           "getDistribution", &DynaCoM::getDistribution, bp::arg("self"), Copied(),
           "The last distribution, be it distributeForce()'s or that of computeDynamics on uneven\n"

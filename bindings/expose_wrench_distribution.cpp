@@ -83,8 +83,8 @@ void exposeWrenchDistribution() {
       "InvalidInput: a number that came in was not finite; the forces are those of the last "
       "answer\n"
       "if contacts and settings are still the same, else zero.\n"
-      "NumericalFailure: the iterations were used up, or the answer did not pass the check; the\n"
-      "forces are as for InvalidInput.");
+      "NumericalFailure: the iterations were used up (WrenchDistribution.setMaximalIterations()),\n"
+      "or the answer did not pass the check; the forces are as for InvalidInput.");
   status.value("Solved", DistributionStatus::Solved)
       .value("Relaxed", DistributionStatus::Relaxed)
       .value("NoContact", DistributionStatus::NoContact)
@@ -175,7 +175,10 @@ void exposeWrenchDistribution() {
       "WrenchDistribution",
       "How contacts share a wrench: the cheapest forces within all inequalities that give it,\n"
       "equations (9-13), or the closest wrench that the contacts can give. clear(), add() every\n"
-      "contact, solve(), result().",
+      "contact, solve(), result().\n\n"
+      "Contacts are held in slots, numbered from 0 on. What is kept from one problem to the next\n"
+      "is kept by slot: storage, and which inequalities were active, from where the next solve()\n"
+      "starts.",
       bp::init<>(bp::arg("self")))
       .def(
           "setWrenchWeights",
@@ -186,20 +189,46 @@ void exposeWrenchDistribution() {
           "computeMargin() may be wrong. ValueError unless all are finite and > 0.")
       .def("getWrenchWeights", &WrenchDistribution::getWrenchWeights, bp::arg("self"), Copied(),
            "Those weights, (6,).")
-      .def(
-          "clear", &WrenchDistribution::clear, bp::arg("self"),
-          "Begins a new problem, without contacts. If what is added next has the inequalities and\n"
-          "weights of before, a solve() without an answer keeps the forces of before.")
+      .def("setWarmStart", &WrenchDistribution::setWarmStart,
+           (bp::arg("self"), bp::arg("warmStart")),
+           "Whether solve() starts from the inequalities that were active in each slot's last\n"
+           "answer, as is the default; else it starts with none. That changes how long it takes,\n"
+           "and answers by no more than rounding.")
+      .def("getWarmStart", &WrenchDistribution::getWarmStart, bp::arg("self"),
+           "Whether it does; True by default.")
+      .def("setMaximalIterations", &WrenchDistribution::setMaximalIterations,
+           (bp::arg("self"), bp::arg("maximalIterations")),
+           "How many iterations solve() may take, kMaximalIterations by default: those of\n"
+           "DistributionResult.iterations. Of feet on level ground nearly all problems take less\n"
+           "than 10; a problem that needs more than this ends as NumericalFailure. ValueError\n"
+           "unless maximalIterations > 0.")
+      .def("getMaximalIterations", &WrenchDistribution::getMaximalIterations, bp::arg("self"),
+           "How many iterations solve() may take.")
+      .def("reserve", &WrenchDistribution::reserve,
+           (bp::arg("self"), bp::arg("contact"), bp::arg("slot")),
+           "Gets a slot's storage ready for a contact, so that a problem with it allocates\n"
+           "nothing, whichever of the other slots take part. ValueError if the contact was never\n"
+           "initialised, or slot is more than the number of slots that there are.")
+      .def("reset", &WrenchDistribution::reset, bp::arg("self"),
+           "Forgets contacts, slots, and the answer; weights and settings stay.")
+      .def("clear", &WrenchDistribution::clear, bp::arg("self"),
+           "Begins a new problem, without contacts. If what is added next has the slots,\n"
+           "inequalities and weights of before, a solve() without an answer keeps the forces of\n"
+           "before.")
       .def<void (WrenchDistribution::*)(const ContactBase&)>(
           "add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact")),
-          "Adds a contact with the matrices that it has now. ValueError if it was never "
-          "initialised,\n"
-          "NotReadyError if updateNewtonEuler() never placed it.")
-      .def(
-          "add", &addMatrices, (bp::arg("self"), bp::arg("A"), bp::arg("weights"), bp::arg("NE")),
-          "Adds a contact by its matrices: inequalities A lambda <= 0, (m, n); weights > 0 of the\n"
-          "cost, (n,); NE, (6, n), takes lambda to the wrench about the centre of mass.\n"
-          "ValueError if the sizes do not fit, A is not finite or a weight not > 0.")
+          "Adds a contact, with the matrices that it has now, in the slot of its position.\n"
+          "ValueError if it was never initialised, or the slot is taken; NotReadyError if\n"
+          "updateNewtonEuler() never placed it.")
+      .def<void (WrenchDistribution::*)(const ContactBase&, std::size_t)>(
+          "add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact"), bp::arg("slot")),
+          "The same in another slot, for contacts that are not always the same ones. ValueError,\n"
+          "too, if slot is more than the number of slots that there are.")
+      .def("add", &addMatrices, (bp::arg("self"), bp::arg("A"), bp::arg("weights"), bp::arg("NE")),
+           "Adds a contact by its matrices, in the slot of its position: inequalities\n"
+           "A lambda <= 0, (m, n); weights > 0 of the cost, (n,); NE, (6, n), takes lambda to the\n"
+           "wrench about the centre of mass. ValueError if the sizes do not fit, A is not finite,\n"
+           "a weight is not finite and > 0, or the slot is taken.")
       .def(
           "solve", &solve, (bp::arg("self"), bp::arg("wrench"), bp::arg("minimalScale") = 0.),
           "Solves for the forces that give a wrench, (6,): force [N], moment [N·m] about the\n"
@@ -215,7 +244,8 @@ void exposeWrenchDistribution() {
            "How far the last solve()'s wrench is from what the contacts cannot give: a\n"
            "WrenchMargin. Up to twelve small problems, too much for a control loop.")
       .def(PrintVisitor<WrenchDistribution>(&writeDistribution))
-      .def(CopyVisitor<WrenchDistribution>());
+      .def(CopyVisitor<WrenchDistribution>())
+      .attr("kMaximalIterations") = WrenchDistribution::kMaximalIterations;
 }
 
 }  // namespace dynacom::python

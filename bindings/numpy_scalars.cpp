@@ -3,8 +3,8 @@
 
 // Boost.Python takes Python's own numbers only. What comes out of an array, `contacts[k]` for
 // example, is one of numpy's. For them there are these converters: floating-point numbers and
-// integers become double, integers a frame's index, booleans bool. Complex numbers and times do not
-// say which number they would be, and are refused.
+// integers become double, integers int and an index, booleans bool. Complex numbers and times do
+// not say which number they would be, and are refused.
 //
 // A process has one registry of converters, so that Pinocchio's functions, and those of every other
 // module of Boost.Python, take these numbers too, once DynaCoM is imported. That does no harm: the
@@ -76,7 +76,8 @@ struct FromNumpyScalar {
 
 void takeNumpyScalars() {
   FromNumpyScalar<bool>::add();
-  FromNumpyScalar<unsigned long>::add();  // pinocchio::FrameIndex
+  FromNumpyScalar<int>::add();
+  FromNumpyScalar<unsigned long>::add();  // pinocchio::FrameIndex, std::size_t
   FromNumpyScalar<double>::add();
 }
 

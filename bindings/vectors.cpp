@@ -23,6 +23,14 @@ std::string describeRefused(const bp::object& values) {
 
 }  // namespace
 
+const double* findNumbers(const bp::object& values, int size) {
+  if (!PyArray_Check(values.ptr())) return nullptr;
+  auto* const array = reinterpret_cast<PyArrayObject*>(values.ptr());
+  const bool fits = PyArray_NDIM(array) == 1 && PyArray_DIM(array, 0) == size &&
+                    PyArray_TYPE(array) == NPY_DOUBLE && PyArray_ISCARRAY_RO(array);
+  return fits ? static_cast<const double*>(PyArray_DATA(array)) : nullptr;
+}
+
 Eigen::VectorXd toNumbers(const char* name, const bp::object& values, int size) {
   const bp::extract<Eigen::VectorXd> array(values);
   if (array.check()) return array();

@@ -37,6 +37,8 @@ from helpers import (
     point,
     random_configuration,
     random_humanoid,
+    random_pose,
+    random_tree,
     reference_configuration,
     robots_folder,
     share_by_edges,
@@ -147,6 +149,8 @@ GETTERS = (
     "getGroundHeight",
     "getMinimalVerticalForce",
     "getWrenchWeights",
+    "getWarmStart",
+    "getMaximalIterations",
     "isCoPDefined",
     "getSettings",
     "getActiveContacts",
@@ -387,6 +391,7 @@ def test_initialize_again(robot):
 
 BEFORE_INITIALIZE = {
     "computeDynamics": lambda robot: robot.computeDynamics(np.zeros(7), np.zeros(6), np.zeros(6)),
+    "computeDynamics of data": lambda robot: robot.computeDynamics(pin.Model().createData()),
     "computeNL": lambda robot: robot.computeNL(3.0),
     "computeNL of a motion": lambda robot: robot.computeNL(
         3.0, np.zeros(7), np.zeros(6), np.zeros(6)
@@ -416,6 +421,8 @@ def test_what_works_before_initialize():
     robot.setGroundHeight(0.5)
     robot.setMinimalVerticalForce(2.0)
     robot.setWrenchWeights(np.full(6, 3.0))
+    robot.setWarmStart(False)
+    robot.setMaximalIterations(50)
     for name in (*MOTION_GETTERS, "ne_b"):
         assert np.isnan(getattr(robot, name)()).all(), name
     assert not robot.isCoPDefined()
@@ -423,14 +430,18 @@ def test_what_works_before_initialize():
     assert robot.getDistributionStatus() == DistributionStatus.NoContact
     assert robot.getDistribution().contacts == []
     assert robot.getKnownContacts() == robot.getActiveContacts() == []
-    for name in ("getContact", "removeContact", *CONTACT_GETTERS):
+    for name in ("getContact", "removeContact", "resetContactPose", *CONTACT_GETTERS):
         with pytest.raises(ValueError, match="no contact 'a'; known: none"):
             getattr(robot, name)("a")
+    with pytest.raises(ValueError, match="no contact 'a'; known: none"):
+        robot.setContactPose("a", pin.SE3.Identity())
     robot.initialize(pendulum_settings())
     assert robot.isInitialized()
     assert robot.getGroundHeight() == 0.5
     assert robot.getMinimalVerticalForce() == 2.0
     assert_array_equal(robot.getWrenchWeights(), np.full(6, 3.0))
+    assert not robot.getWarmStart()
+    assert robot.getMaximalIterations() == 50
 
 
 def test_computeNL_needs_a_motion(robot):
@@ -464,6 +475,7 @@ def test_before_computeDynamics(robot):
 
 
 def test_keywords_and_defaults(robot):
+    robot.setWarmStart(False)  # so that the same problem again takes the same steps
     q, v, a = motion(robot.getModel(), 0)
     robot.computeDynamics(q, v, a)
     expected = state(robot)
@@ -516,6 +528,12 @@ def test_keywords_and_defaults(robot):
     assert robot.getMinimalVerticalForce() == 2.0
     robot.setWrenchWeights(weights=np.arange(1, 7))
     assert_array_equal(robot.getWrenchWeights(), np.arange(1, 7))
+    robot.setWarmStart(warmStart=True)
+    assert robot.getWarmStart() is True
+    robot.setMaximalIterations(maximalIterations=20)
+    assert robot.getMaximalIterations() == 20
+    robot.setContactPose(name="a", oMs=pin.SE3.Identity())
+    robot.resetContactPose(name="a")
     for name in CONTACT_GETTERS:
         getattr(robot, name)(name="a")
 
@@ -649,6 +667,7 @@ def test_arrays_of_any_kind(robot):
     q[7:] = rng.integers(-2, 3, model.nq - 7)
     v, a = rng.integers(-3, 4, (2, model.nv))
     wrench, com = np.arange(6) - 3, np.array([1, -1, 2])
+    robot.setWarmStart(False)  # so that the same problem again takes the same steps
     states = {}
     robot.computeNL(3, q, v, a, wrench)
     for kinds in zip(*map(array_kinds, (q, v, a, wrench, com, wrench[:3])), strict=True):
@@ -786,6 +805,7 @@ def test_numbers_of_the_wrong_type(robot, wrong):
 @pytest.mark.parametrize("flat", [True, False])
 def test_motion_that_is_not_finite(robot, argument, value, flat):
     """A fact of the world, not an exception; the next sample is analysed as if nothing had been."""
+    robot.setWarmStart(False)
     arguments = [*motion(robot.getModel(), 0), np.zeros(6)]
 
     def compute(arguments):
@@ -829,6 +849,7 @@ def test_motion_beyond_the_largest_numbers(robot):
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("argument", range(3), ids=["groundCoMForce", "groundCoMTorque", "com"])
 def test_distribution_of_what_is_not_finite(robot, argument, value):
+    robot.setWarmStart(False)
     robot.computeDynamics(*motion(robot.getModel(), 0))
     arguments = [robot.getGroundCoMForce(), robot.getGroundCoMTorque(), robot.getCoM()]
     assert robot.distributeForce(*arguments) == SOLVED
@@ -885,6 +906,557 @@ def test_forces_without_an_answer(robot, change):
         assert_array_equal(robot.getDistribution().forces(), forces)
     assert distribute(robot) in (SOLVED, RELAXED)
     assert robot.getDistribution().isOptimal()
+
+
+# A motion of which Pinocchio has computed all.
+
+
+def computed(model: pin.Model, *motion: np.ndarray) -> pin.Data:
+    """As a controller has it that computes momenta anyway."""
+    data = model.createData()
+    pin.computeCentroidalMomentumTimeVariation(model, data, *motion)
+    return data
+
+
+def results(robot: DynaCoM) -> dict[str, object]:
+    """All that is promised to be the same, whoever has computed the motion."""
+    values = state(robot)
+    del values["data.com"]
+    return values
+
+
+def assert_same_by_data(
+    robot: DynaCoM, motions: list[tuple[np.ndarray, ...]], wrenches: np.ndarray, flat: bool
+) -> None:
+    """Of both ways, on two robots, over several ticks: after each of these, all is the same."""
+    model, other = robot.getModel(), robot.copy()
+    for (q, v, a), wrench in zip(motions, wrenches, strict=True):
+        robot.computeDynamics(q, v, a, wrench, flat)
+        other.computeDynamics(computed(model, q, v, a), wrench, flat)
+        assert_same(results(other), results(robot))
+        for dynamics in (robot, other):
+            dynamics.computeNL(3.0)
+            distribute(dynamics)
+        assert_same(results(other), results(robot))
+
+
+@CALM
+@given(st.integers(0, 2**32 - 1), st.booleans())
+def test_dynamics_of_data(seed, flat):
+    """Random robots, with joints of many types, on soles and points."""
+    rng = np.random.default_rng(seed)
+    model = random_tree(seed)
+    robot = DynaCoM(model)
+    for number in range(1, rng.integers(2, 5)):
+        frame = f"frame{number}"
+        contact = sole(frame_name=frame) if rng.integers(2) else point(frame_name=frame, radius=0.1)
+        robot.addContact(contact, frame, bool(rng.integers(4)))
+    motions = [motion(model, int(number)) for number in rng.integers(2**31, size=3)]
+    assert_same_by_data(robot, motions, rng.uniform(-50.0, 50.0, (3, 6)), flat)
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_dynamics_of_data_of_talos(talos, talos_standing, flat):
+    """Standing, so that there is something to distribute; the ground is not at zero."""
+    rng = np.random.default_rng(0)
+    robot = talos.dynacom()
+    robot.setGroundHeight(0.01)
+    motions = [(talos_standing, *0.1 * rng.standard_normal((2, talos.model.nv))) for _ in range(5)]
+    assert_same_by_data(robot, motions, rng.uniform(-5.0, 5.0, (5, 6)), flat)
+    assert robot.getDistributionStatus() == SOLVED
+
+
+def test_dynamics_of_one_s_own_data(robot):
+    """Pinocchio's algorithm may have run on getData() itself."""
+    model, data = robot.getModel(), robot.getData()
+    q, v, a = motion(model, 0)
+    other = robot.copy()
+    other.computeDynamics(q, v, a)
+    pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a)
+    robot.computeDynamics(data)
+    assert_same(state(robot), state(other))
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_nothing_is_kept_of_data(robot, flat):
+    """It may be overwritten, and go; the robot's own data knows where the joints are."""
+    model = robot.getModel()
+    other = robot.copy()
+    other.computeDynamics(*motion(model, 0), flatHorizontalGround=flat)
+    data = computed(model, *motion(model, 0))
+    robot.computeDynamics(data, flatHorizontalGround=flat)
+    pin.computeCentroidalMomentumTimeVariation(model, data, *motion(model, 1))
+    assert_same(results(robot), results(other))
+    del data
+    gc.collect()
+    for dynamics in (robot, other):
+        dynamics.activateContact("c")
+        dynamics.addContact(sole_of(model, "d"), "d")
+        dynamics.computeNL(3.0)
+        assert distribute(dynamics) == SOLVED
+    assert_same(results(robot), results(other))
+
+
+def test_data_is_left_as_it_is(robot):
+    model = robot.getModel()
+    data = computed(model, *motion(model, 0))
+    before = [placement.homogeneous for placement in data.oMi]
+    momentum = data.hg.vector.copy(), data.dhg.vector.copy()
+    robot.computeDynamics(data, np.ones(6), False)
+    assert_array_equal([placement.homogeneous for placement in data.oMi], before)
+    assert_array_equal((data.hg.vector, data.dhg.vector), momentum)
+
+
+def test_data_and_vectors_are_told_apart(robot):
+    """By position, by keyword, with lists: each call ends where it belongs."""
+    robot.setWarmStart(False)  # so that the same problem again takes the same steps
+    q, v, a = motion(robot.getModel(), 0)
+    data = computed(robot.getModel(), q, v, a)
+    wrench = np.arange(6.0)
+    for flat in (True, False):
+        robot.computeDynamics(q, v, a, wrench, flat)
+        expected = results(robot)
+        for arguments, keywords in (
+            ((q, v, a, list(wrench), flat), {}),
+            ((q, v), {"a": a, "extWrench": tuple(wrench), "flatHorizontalGround": flat}),
+            ((data, wrench, flat), {}),
+            ((data, list(wrench), np.bool_(flat)), {}),
+            ((data, tuple(wrench)), {"flatHorizontalGround": flat}),
+            ((data,), {"extWrench": wrench, "flatHorizontalGround": flat}),
+            ((), {"flatHorizontalGround": flat, "extWrench": list(wrench), "data": data}),
+        ):
+            robot.computeDynamics(*motion(robot.getModel(), 1))
+            assert robot.computeDynamics(*arguments, **keywords) is None
+            assert_same(results(robot), expected)
+    robot.computeDynamics(q, v, a)
+    expected = results(robot)
+    for arguments, keywords in (((data,), {}), ((), {"data": data})):
+        robot.computeDynamics(*motion(robot.getModel(), 1))
+        robot.computeDynamics(*arguments, **keywords)
+        assert_same(results(robot), expected)
+
+
+def test_data_of_the_wrong_type(robot):
+    q, v, a = motion(robot.getModel(), 0)
+    data = computed(robot.getModel(), q, v, a)
+    robot.computeDynamics(data)
+    before = state(robot)
+    for arguments in (
+        (),
+        (None,),
+        (robot.getModel(),),
+        (robot,),
+        (q,),
+        (q, v),
+        (data, data),
+        (data, None),
+        (data, 3.0),
+        (data, True),
+        (data, "123456"),
+        (data, [1, 2, 3, 4, 5, "6"]),
+        (data, v, a),
+        (data, np.zeros(6), "flat"),
+        (data, np.zeros(6), True, True),
+        (q, v, data),
+    ):
+        with pytest.raises(TypeError):
+            robot.computeDynamics(*arguments)
+    for size in (0, 5, 7):
+        with pytest.raises(ValueError, match=f"^extWrench must have 6 components, got {size}$"):
+            robot.computeDynamics(data, np.zeros(size))
+    assert_same(state(robot), before)
+
+
+def test_data_of_another_robot(robot):
+    """By the number of its joints, or by its mass; nothing has changed."""
+    model = robot.getModel()
+    robot.computeNL(3.0, *motion(model, 0))
+    assert distribute(robot) == SOLVED
+    before = state(robot)
+    other = DynaCoM(pendulum_settings()).getModel()
+    message = rf"^data.oMi must have {model.njoints} placements \(one per joint\), got 3$"
+    with pytest.raises(ValueError, match=message):
+        robot.computeDynamics(computed(other, *motion(other, 0)))
+
+    heavier = pin.Model(model)
+    load = pin.Inertia(0.001, np.zeros(3), np.zeros((3, 3)))
+    heavier.appendBodyToJoint(1, load, pin.SE3.Identity())
+    data = computed(heavier, *motion(model, 0))
+    mass = rf"data's mass must be {robot.getMass():g} kg, got {data.mass[0]:g}"
+    with pytest.raises(NotReadyError, match=mass):
+        robot.computeDynamics(data)
+    assert_same(state(robot), before)
+
+
+def test_data_without_momenta(robot):
+    """Data on which nothing has run, or only kinematics; nothing has changed."""
+    model = robot.getModel()
+    robot.computeNL(3.0, *motion(model, 0))
+    assert distribute(robot) == SOLVED
+    before = state(robot)
+    placed = model.createData()
+    pin.forwardKinematics(model, placed, *motion(model, 0))
+    message = r"needs computeCentroidalMomentumTimeVariation\(model, data, q, v, a\) before"
+    for data in (model.createData(), placed):
+        for flat in (True, False):
+            with pytest.raises(NotReadyError, match=message):
+                robot.computeDynamics(data, np.zeros(6), flat)
+            assert_same(state(robot), before)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("argument", range(4), ids=["q", "v", "a", "extWrench"])
+@pytest.mark.parametrize("flat", [True, False])
+def test_data_that_is_not_finite(robot, argument, value, flat):
+    """As if the motion had been given: no exception, no number, the forces of before."""
+    robot.setWarmStart(False)
+    model = robot.getModel()
+    arguments = [*motion(model, 0), np.zeros(6)]
+
+    def compute(arguments):
+        robot.computeDynamics(computed(model, *arguments[:3]), arguments[3], flat)
+        robot.computeNL(3.0)
+
+    compute(arguments)
+    distribute(robot)
+    before = state(robot)
+    for component in (0, -1):
+        broken = [array.copy() for array in arguments]
+        broken[argument][component] = value
+        status = robot.getDistributionStatus()
+        compute(broken)
+        for name in MOTION_GETTERS:
+            assert np.isnan(getattr(robot, name)()).all(), name
+        assert robot.getDistributionStatus() == (status if flat else INVALID)
+        assert_array_equal(robot.allForces(), before["allForces"])
+        assert distribute(robot) == INVALID
+        assert_array_equal(robot.allForces(), before["allForces"])
+    compute(arguments)
+    distribute(robot)
+    assert_same(state(robot), before)
+
+
+# Contacts where they were measured.
+
+
+def somewhere(seed: int) -> pin.SE3:
+    """Within a metre of the world's origin, and not too steep to stand on."""
+    return random_pose(np.random.default_rng(seed), tilt=0.6)
+
+
+def moved(pose: pin.SE3, rng: np.random.Generator) -> pin.SE3:
+    """Elsewhere by some centimetres, and turned by some degrees."""
+    return pose * pin.SE3(pin.exp3(rng.uniform(-0.2, 0.2, 3)), rng.uniform(-0.05, 0.05, 3))
+
+
+def wrench_from(
+    forces: dict[str, np.ndarray], poses: dict[str, pin.SE3], com: np.ndarray
+) -> np.ndarray:
+    """What forces at these places give about the centre of mass, term by term."""
+    force, moment = np.zeros(3), np.zeros(3)
+    for name, pose in poses.items():
+        pushed, turned = np.split(np.append(forces[name], np.zeros(3))[:6], 2)
+        pushed, turned = pose.rotation @ pushed, pose.rotation @ turned
+        force += pushed
+        moment += turned + np.cross(pose.translation - com, pushed)
+    return np.concatenate([force, moment])
+
+
+def forces_of(robot: DynaCoM) -> dict[str, np.ndarray]:
+    return {name: robot.getContact(name).appliedForce() for name in robot.getActiveContacts()}
+
+
+@pytest.mark.parametrize("way", ["distributeForce", "computeDynamics", "computeDynamics of data"])
+def test_forces_about_displaced_feet(talos, talos_standing, way):
+    """They give the wrench asked for about the places measured, and about no others."""
+    rng = np.random.default_rng(0)
+    model = talos.model
+    for _ in range(10):
+        robot = talos.dynacom()
+        v, a = 0.1 * rng.standard_normal((2, model.nv))
+        robot.computeDynamics(talos_standing, v, a)
+        poses = {name: robot.getContact(name).getPose() for name in robot.getActiveContacts()}
+        measured = {name: moved(pose, rng) for name, pose in poses.items()}
+        for name, pose in measured.items():
+            robot.setContactPose(name, pose)
+            assert robot.getContact(name).getPose() == pose
+        if way == "distributeForce":
+            distribute(robot)
+        elif way == "computeDynamics":
+            robot.computeDynamics(talos_standing, v, a, flatHorizontalGround=False)
+        else:
+            data = computed(model, talos_standing, v, a)
+            robot.computeDynamics(data, flatHorizontalGround=False)
+        assert robot.getDistributionStatus() == SOLVED
+        forces, wrench = forces_of(robot), robot.ne_b()
+        tolerance = 1e-9 * np.linalg.norm(wrench)
+        given = wrench_from(forces, measured, robot.getCoM())
+        assert_allclose(given, wrench, rtol=0, atol=tolerance)
+        elsewhere = wrench_from(forces, poses, robot.getCoM())
+        assert np.abs(elsewhere - wrench).max() > 1e6 * tolerance
+        for name, pose in measured.items():
+            assert robot.getContact(name).getPose() == pose
+            assert_within_cones(robot.getContact(name), tolerance)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_measured_poses_and_another_centre_of_mass(robot, moving):
+    """That of the call counts, not that of a motion, which there need not be."""
+    if moving:
+        robot.computeDynamics(*motion(robot.getModel(), 0))
+    poses = {name: somewhere(seed) for seed, name in enumerate("ab")}
+    for name, pose in poses.items():
+        robot.setContactPose(name, pose)
+    com = np.array([0.3, -0.2, 0.9])
+    robot.distributeForce(G * robot.getMass() * UP, np.zeros(3), com)
+    result, forces = robot.getDistribution(), forces_of(robot)
+    given = wrench_from(forces, poses, com)
+    assert np.linalg.norm(given) > 1.0
+    assert_allclose(given, result.achieved, rtol=0, atol=1e-9 * result.scale)
+
+
+def test_centre_of_pressure_of_displaced_feet(talos, talos_standing):
+    """(6) by hand: each sole's own centre, where the sole was measured, by its vertical force."""
+    rng = np.random.default_rng(1)
+    robot = talos.dynacom()
+    zero = np.zeros(talos.model.nv)
+    robot.computeDynamics(talos_standing, zero, zero)
+    measured = {
+        name: moved(robot.getContact(name).getPose(), rng) for name in robot.getActiveContacts()
+    }
+    for name, pose in measured.items():
+        robot.setContactPose(name, pose)
+    robot.computeDynamics(talos_standing, zero, zero, flatHorizontalGround=False)
+    moment, vertical = np.zeros(2), 0.0
+    for name, pose in measured.items():
+        force = robot.getContact(name).appliedForce()
+        place = pose.act(np.array([-force[4], force[3], 0.0]) / force[2])
+        lifted = pose.rotation[2] @ force[:3]
+        moment += lifted * place[:2]
+        vertical += lifted
+    assert_allclose(robot.getCoP(), moment / vertical, rtol=0, atol=1e-12)
+
+
+def test_displaced_points(anymal, anymal_standing):
+    """Of a ball foot the frame is measured; the surface is the radius below, as always."""
+    rng = np.random.default_rng(0)
+    robot = anymal.dynacom()
+    zero = np.zeros(anymal.model.nv)
+    robot.computeDynamics(anymal_standing, zero, zero)
+    surfaces = {}
+    for name in robot.getActiveContacts():
+        contact = robot.getContact(name)
+        assert contact.getSettings().world_aligned
+        pose = moved(contact.getPose(), rng)
+        robot.setContactPose(name, pose)
+        below = pose.translation - contact.getSettings().radius * UP
+        surfaces[name] = pin.SE3(np.eye(3), below)
+        assert contact.getPose() == pose
+        assert_allclose(contact.getSurfacePose().homogeneous, surfaces[name].homogeneous)
+    assert distribute(robot) == SOLVED
+    given = wrench_from(forces_of(robot), surfaces, robot.getCoM())
+    assert_allclose(given, robot.ne_b(), rtol=0, atol=1e-9 * G * robot.getMass())
+
+
+def assert_stands_at(robot: DynaCoM, name: str, pose: pin.SE3) -> None:
+    """Pose and matrix about the centre of mass are those of that place."""
+    contact = robot.getContact(name)
+    assert_allclose(contact.getPose().homogeneous, pose.homogeneous, rtol=0, atol=1e-14)
+    expected = pin.SE3(pose.rotation, pose.translation - robot.getCoM()).toDualActionMatrix()
+    assert_allclose(contact.ne_A(), expected, rtol=0, atol=1e-13)
+
+
+def modelled(robot: DynaCoM, name: str, q: np.ndarray) -> pin.SE3:
+    model = robot.getModel()
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId(FRAMES[name])]
+
+
+LASTING = {
+    "computeDynamics": lambda robot: robot.computeDynamics(*motion(robot.getModel(), 1)),
+    "computeDynamics of data": lambda robot: robot.computeDynamics(
+        computed(robot.getModel(), *motion(robot.getModel(), 1))
+    ),
+    "uneven ground": lambda robot: robot.computeDynamics(
+        *motion(robot.getModel(), 1), flatHorizontalGround=False
+    ),
+    "computeNL": lambda robot: robot.computeNL(3.0, *motion(robot.getModel(), 1)),
+    "distributeForce": lambda robot: distribute(robot),
+    "kinematics": lambda robot: pin.forwardKinematics(
+        robot.getModel(), robot.getData(), random_configuration(robot.getModel(), 1)
+    ),
+    "activated again": lambda robot: (robot.deactivateContact("a"), robot.activateContact("a")),
+    "another one": lambda robot: robot.setContactPose("b", somewhere(1)),
+    "another one reset": lambda robot: robot.resetContactPose("b"),
+    "an invalid motion": lambda robot: robot.computeDynamics(
+        np.full(robot.getModel().nq, np.nan), *motion(robot.getModel(), 1)[1:]
+    ),
+    "other settings": lambda robot: robot.getContact("a").setMu(0.3),
+    "initialised again": lambda robot: move(robot.getContact("a"), FRAMES["a"]),
+}
+
+
+@pytest.mark.parametrize("event", LASTING)
+def test_measured_poses_last(robot, event):
+    """Until they are reset, whatever happens."""
+    model = robot.getModel()
+    robot.computeDynamics(*motion(model, 0))
+    pose = somewhere(0)
+    robot.setContactPose("a", pose)
+    assert_stands_at(robot, "a", pose)
+    LASTING[event](robot)
+    assert robot.getContact("a").getPose() == pose
+    robot.computeDynamics(*motion(model, 2))
+    assert_stands_at(robot, "a", pose)
+    robot.computeDynamics(*motion(model, 3), flatHorizontalGround=False)
+    distribute(robot)
+    assert_stands_at(robot, "a", pose)
+    robot.resetContactPose("a")
+    robot.computeDynamics(*motion(model, 3))
+    assert_stands_at(robot, "a", modelled(robot, "a", motion(model, 3)[0]))
+
+
+@pytest.mark.parametrize("way", ["distributeForce", "computeDynamics"])
+def test_poses_that_are_reset(robot, way):
+    """By the model again, from the next call on that places contacts; twice does no harm."""
+    model = robot.getModel()
+    robot.computeDynamics(*motion(model, 0))
+    pose = somewhere(0)
+    robot.setContactPose("a", pose)
+    distribute(robot)
+    for _ in range(2):
+        robot.resetContactPose("a")
+        assert_stands_at(robot, "a", pose)
+    if way == "distributeForce":
+        distribute(robot)
+    else:
+        robot.computeDynamics(*motion(model, 0))
+    assert_stands_at(robot, "a", modelled(robot, "a", motion(model, 0)[0]))
+
+
+def test_poses_that_were_never_measured_stay_the_model_s(robot):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    assert distribute(robot) == SOLVED
+    before = state(robot)
+    for name in "abc":
+        robot.resetContactPose(name)
+    assert_same(state(robot), before)
+    robot.setContactPose("a", somewhere(1))
+    for name in "bc":
+        assert_array_equal(
+            robot.getContact(name).getPose().homogeneous, before[f"{name}.pose"], name
+        )
+
+
+def test_poses_measured_again(robot):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    pose = somewhere(0)
+    robot.setContactPose("a", somewhere(1))
+    robot.setContactPose("a", pose)
+    distribute(robot)
+    assert_stands_at(robot, "a", pose)
+
+
+def test_poses_measured_before_the_motion(robot):
+    """And of a contact that is not active yet."""
+    poses = {name: somewhere(seed) for seed, name in enumerate("ac")}
+    for name, pose in poses.items():
+        robot.setContactPose(name, pose)
+        assert robot.getContact(name).getPose() == pose
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    robot.activateContact("c")
+    assert distribute(robot) == SOLVED
+    poses["b"] = modelled(robot, "b", motion(robot.getModel(), 0)[0])
+    for name, pose in poses.items():
+        assert_stands_at(robot, name, pose)
+    given = wrench_from(forces_of(robot), poses, robot.getCoM())
+    assert_allclose(given, robot.ne_b(), rtol=0, atol=1e-8 * np.linalg.norm(robot.ne_b()))
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, DynaCoM.copy])
+def test_copies_keep_measured_poses(robot, copied):
+    """Each its own: what one measures from then on is nothing to the other."""
+    model = robot.getModel()
+    robot.computeDynamics(*motion(model, 0))
+    pose = somewhere(0)
+    robot.setContactPose("a", pose)
+    other = copied(robot)
+    robot.resetContactPose("a")
+    other.setContactPose("b", somewhere(1))
+    for dynamics in (robot, other):
+        dynamics.computeDynamics(*motion(model, 1))
+        distribute(dynamics)
+    assert_stands_at(other, "a", pose)
+    for name in "ab":
+        assert_stands_at(robot, name, modelled(robot, name, motion(model, 1)[0]))
+    del robot
+    gc.collect()
+    other.computeDynamics(*motion(model, 2))
+    assert_stands_at(other, "a", pose)
+
+
+def test_measured_poses_are_copies(robot):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    pose = somewhere(0)
+    given = pose.copy()
+    robot.setContactPose("a", given)
+    given.translation = np.zeros(3)
+    del given
+    gc.collect()
+    distribute(robot)
+    assert_stands_at(robot, "a", pose)
+
+
+def test_removed_contacts_forget_where_they_were_measured(robot):
+    """As do all, when the robot is initialised again."""
+    model = robot.getModel()
+    contact = robot.getContact("a")
+    robot.setContactPose("a", somewhere(1))
+    robot.removeContact("a")
+    robot.addContact(contact, "a")
+    robot.computeDynamics(*motion(model, 0))
+    assert_stands_at(robot, "a", modelled(robot, "a", motion(model, 0)[0]))
+    robot.setContactPose("a", somewhere(1))
+    robot.initialize(pin.Model(model))
+    robot.addContact(contact, "a")
+    robot.computeDynamics(*motion(model, 0))
+    assert_stands_at(robot, "a", modelled(robot, "a", motion(model, 0)[0]))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("part", ["translation", "rotation"])
+def test_measured_poses_that_are_not_finite(robot, part, value):
+    """A fact of the world: a status, and the forces of before, until there is a better pose."""
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    assert distribute(robot) == SOLVED
+    kept = robot.allForces()
+    lost = pin.SE3.Identity()
+    setattr(lost, part, np.full_like(getattr(lost, part), value))
+    robot.setContactPose("a", lost)
+    for _ in range(2):
+        assert distribute(robot) == INVALID
+        assert_array_equal(robot.allForces(), kept)
+    robot.computeDynamics(*motion(robot.getModel(), 0), flatHorizontalGround=False)
+    assert robot.getDistributionStatus() == INVALID
+    assert np.isnan(robot.getCoP()).all()
+    assert not robot.isCoPDefined()
+    robot.resetContactPose("a")
+    assert distribute(robot) == SOLVED
+    assert_allclose(robot.allForces(), kept, rtol=0, atol=1e-9 * np.abs(kept).max())
+
+
+@pytest.mark.parametrize("wrong", [None, "pose", np.eye(4), np.zeros(3), pin.Motion.Zero(), {}])
+def test_measured_poses_of_the_wrong_type(robot, wrong):
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    before = state(robot)
+    with pytest.raises(TypeError):
+        robot.setContactPose("a", wrong)
+    with pytest.raises(TypeError):
+        robot.setContactPose("a")
+    assert_same(state(robot), before)
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    assert_same(state(robot), before)
 
 
 # Pinocchio's objects, and lifetimes.
@@ -1171,13 +1743,19 @@ def test_contacts_that_cannot_be_added(robot, add):
         "activateContact6d",
         "deactivateContact6d",
         "getContact",
+        "setContactPose",
+        "resetContactPose",
         *CONTACT_GETTERS,
     ],
 )
 def test_names_that_are_not_known(robot, name):
     """The message names those that are."""
     before = state(robot)
-    call = getattr(robot, name)
+    more = [pin.SE3.Identity()] if name == "setContactPose" else []
+
+    def call(contact_name, robot=robot):
+        getattr(robot, name)(contact_name, *more)
+
     with pytest.raises(ValueError, match="no contact 'z'; known: 'a', 'b', 'c'"):
         call("z")
     with pytest.raises(ValueError, match="no contact ''"):
@@ -1187,7 +1765,7 @@ def test_names_that_are_not_known(robot, name):
             call(wrong)
     assert_same(state(robot), before)
     with pytest.raises(ValueError, match="no contact 'a'; known: none"):
-        getattr(DynaCoM(robot.getModel()), name)("a")
+        call("a", DynaCoM(robot.getModel()))
 
 
 def test_activation(robot):
@@ -1450,6 +2028,116 @@ def test_the_scale_is_the_weight(robot):
     assert status == DistributionStatus.NoContact
 
 
+def test_maximal_iterations(robot):
+    """Where they are not enough there is no answer, and the forces are those of the last one."""
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    contacts, com = [robot.getContact(name) for name in "ab"], robot.getCoM()
+    assert distribute(robot) == SOLVED
+    kept = robot.allForces()
+    # At a corner of the first cone: two sides of the pyramid, two edges, and the yaw.
+    settings = contacts[0].getSettings()
+    corner = [settings.mu, settings.mu, 1, settings.half_width, settings.half_length, settings.gu]
+    hard = contacts[0].ne_A() @ np.multiply(100.0, corner) + contacts[1].ne_A() @ np.eye(6)[2]
+
+    assert robot.getMaximalIterations() == dynacom.WrenchDistribution.kMaximalIterations == 10000
+    robot.setWarmStart(False)
+    robot.setMaximalIterations(1)
+    for _ in range(2):
+        status = robot.distributeForce(hard[:3], hard[3:], com)
+        assert status == robot.getDistributionStatus() == DistributionStatus.NumericalFailure
+        assert_array_equal(robot.allForces(), kept)
+        assert robot.getDistribution().iterations == 1
+        assert not robot.getDistribution().isOptimal()
+    robot.activateContact("c")
+    status = robot.distributeForce(hard[:3], hard[3:], com)
+    assert status == DistributionStatus.NumericalFailure
+    assert_array_equal(robot.allForces(), np.zeros(18))
+    robot.deactivateContact("c")
+    robot.setMaximalIterations(100)
+    assert robot.distributeForce(hard[:3], hard[3:], com) == SOLVED
+    assert robot.getDistribution().isOptimal()
+    expected = share_by_edges(contacts, hard).forces
+    assert_allclose(robot.allForces(), expected, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("number", [0, -1, -10000])
+def test_maximal_iterations_out_of_range(robot, number):
+    robot.setMaximalIterations(7)
+    message = f"^maximalIterations must be > 0, got {number}$"
+    with pytest.raises(ValueError, match=message):
+        robot.setMaximalIterations(number)
+    assert robot.getMaximalIterations() == 7
+
+
+def test_maximal_iterations_of_any_kind(robot):
+    """An integer of Python or of numpy, and nothing else."""
+    for number in (20, np.int64(21), np.int32(22), np.uint8(23)):
+        robot.setMaximalIterations(number)
+        assert robot.getMaximalIterations() == number
+        assert type(robot.getMaximalIterations()) is int
+    for wrong in (2.0, np.float64(2.0), None, "2", [2], 2j):
+        with pytest.raises(TypeError):
+            robot.setMaximalIterations(wrong)
+    for large in (2**31, np.int64(2**40), -(2**31) - 1):
+        with pytest.raises(OverflowError):
+            robot.setMaximalIterations(large)
+    assert robot.getMaximalIterations() == 23
+
+
+def test_warm_start_is_a_setting(robot):
+    assert robot.getWarmStart() is True
+    for value in (False, np.bool_(True), np.bool_(False)):
+        robot.setWarmStart(value)
+        assert robot.getWarmStart() is bool(value)
+    for wrong in ("no", 0.5, np.zeros(2)):
+        with pytest.raises(TypeError):
+            robot.setWarmStart(wrong)
+    assert robot.getWarmStart() is False
+
+
+def test_settings_of_distributions_stay(robot):
+    """Through initialize() and in copies, as the weights do."""
+    robot.setWarmStart(False)
+    robot.setMaximalIterations(77)
+    robot.computeDynamics(*motion(robot.getModel(), 0))
+    distribute(robot)
+    robot.initialize(pendulum_settings())
+    for dynamics in (robot, robot.copy(), copy.copy(robot), copy.deepcopy(robot)):
+        assert dynamics.getWarmStart() is False
+        assert dynamics.getMaximalIterations() == 77
+
+
+@CALM
+@given(OPERATIONS, st.integers(0, 2**32 - 1))
+def test_warm_start_changes_no_answer(operations, seed):
+    """However contacts come and go in between, and whether the wrench is in reach or not."""
+    rng = np.random.default_rng(seed)
+    model = random_humanoid(0)
+    warm = DynaCoM(model)
+    for name in "abcd":
+        contact = sole_of(model, name)
+        contact.setMu(rng.uniform(0.2, 1.0))
+        contact.setGu(rng.uniform(0.02, 0.2))
+        warm.addContact(contact, name, bool(rng.integers(2)))
+    cold = warm.copy()
+    cold.setWarmStart(False)
+    q, v, a = motion(model, seed % 1000)
+    direction = 0.02 * rng.standard_normal(model.nv)
+    for operation, name in [*operations, ("distribute", "a")]:
+        q = pin.integrate(model, q, direction)
+        for dynamics in (warm, cold):
+            if operation in ("activate", "deactivate"):
+                getattr(dynamics, f"{operation}Contact")(name)
+            elif operation == "remove":
+                dynamics.setContactPose(name, modelled(dynamics, name, q))
+            dynamics.computeDynamics(q, v, a)
+        assert distribute(warm) == distribute(cold)
+        result, expected = warm.getDistribution(), cold.getDistribution()
+        assert_allclose(result.forces(), expected.forces(), rtol=0, atol=1e-9 * expected.scale)
+        assert_allclose(result.achieved, expected.achieved, rtol=0, atol=1e-9 * expected.scale)
+        assert result.isOptimal()
+
+
 def test_distribution_is_a_copy(robot):
     robot.computeDynamics(*motion(robot.getModel(), 0))
     assert distribute(robot) == SOLVED
@@ -1512,7 +2200,7 @@ def test_feasible_accelerations(seed):
     robot.computeNL(3.0)
     assert_array_equal(robot.getVRP(), vrp)
     robot.computeNL(3.0, q, v, a, pushed, False)
-    assert_allclose(robot.getFeasibleACoM(), acom, rtol=1e-12, atol=1e-12)
+    assert_allclose(robot.getFeasibleACoM(), acom, rtol=1e-10, atol=1e-10)
     assert_allclose(robot.getVRP(), (robot.getCoM() - acom / 9.0)[:2], rtol=1e-9, atol=1e-9)
     if robot.isCoPDefined():
         assert_array_equal(robot.getNL(), robot.getCoP() - robot.getVRP())

@@ -46,12 +46,13 @@ class Walk:
     def __len__(self) -> int:
         return len(self.arrays["t"])
 
-    def go_to(self, frame: int) -> None:
+    def go_to(self, frame: int, flat: bool = True) -> None:
         """The dynamics of a frame, with its contacts active."""
         for name, active in zip(self.names, self.arrays["contacts"][frame], strict=True):
             change = self.robot.activateContact if active else self.robot.deactivateContact
             change(name)
-        self.robot.computeDynamics(*(self.arrays[key][frame] for key in "qva"))
+        motion = (self.arrays[key][frame] for key in "qva")
+        self.robot.computeDynamics(*motion, flatHorizontalGround=flat)
 
     def ground_wrench(self) -> np.ndarray:
         robot = self.robot
@@ -189,6 +190,32 @@ def test_every_frame_is_solved(walk):
         for name in walk.robot.getActiveContacts():
             assert_within_cones(walk.robot.getContact(name), 1e-12 * walk.weight)
         assert walk.robot.getDistribution().isOptimal(1e-9)
+
+
+@pytest.mark.parametrize("mu", [0.7, 0.05])
+@pytest.mark.parametrize("flat", [True, False])
+def test_warm_start_changes_no_answer(walk, mu, flat):
+    """Contacts come and go, in reach and, on slippery ground, out of it."""
+    warm, cold = load(walk.name), load(walk.name)
+    cold.robot.setWarmStart(False)
+    statuses = set()
+    for name in walk.names:
+        for dynamics in (warm, cold):
+            dynamics.robot.getContact(name).setMu(mu)
+    for frame in range(len(walk)):
+        for dynamics in (warm, cold):
+            dynamics.go_to(frame, flat)
+            if flat:
+                dynamics.distribute()
+        result, expected = warm.robot.getDistribution(), cold.robot.getDistribution()
+        assert result.status == expected.status
+        size = np.linalg.norm(expected.forces())
+        assert_allclose(result.forces(), expected.forces(), rtol=0, atol=1e-9 * size)
+        assert_allclose(result.achieved, expected.achieved, rtol=0, atol=1e-9 * expected.scale)
+        assert_allclose(warm.robot.getCoP(), cold.robot.getCoP(), rtol=0, atol=1e-9)
+        assert result.isOptimal()
+        statuses.add(str(result.status))
+    assert statuses == ({"Solved"} if mu == 0.7 else {"Solved", "Relaxed"})
 
 
 def test_single_support(talos_walk):

@@ -17,6 +17,7 @@ from dynacom import (
     ContactPoint,
     DistributionResult,
     DistributionStatus,
+    NotReadyError,
     WrenchDistribution,
     WrenchMargin,
 )
@@ -985,10 +986,15 @@ def test_only_the_ratios_of_wrench_weights_count():
     assert_allclose(result.forces(), expected.forces(), rtol=0, atol=10 * atol)
 
 
-def test_problems_of_changing_size_on_one_object():
-    """Nothing is left of the problem before, however large it was, and whether in reach or not."""
+@pytest.mark.parametrize("warm", [True, False])
+def test_problems_of_changing_size_on_one_object(warm):
+    """Nothing is left of the problem before, however large it was, and whether in reach or not.
+
+    But for rounding, where solve() starts from it.
+    """
     rng = np.random.default_rng(7)
     distribution = WrenchDistribution()
+    distribution.setWarmStart(warm)
     for number in range(100):
         contacts, wrench = reachable(rng)
         wrench *= -1.0 if number % 3 == 0 else 1.0
@@ -996,17 +1002,18 @@ def test_problems_of_changing_size_on_one_object():
         for contact in contacts:
             distribution.add(contact)
         status, forces = distribute(contacts, wrench)
-        assert distribution.solve(wrench) == status
-        assert_array_equal(distribution.result().forces(), forces)
-        # The same again, on what the first solution has left.
-        assert distribution.solve(wrench) == status
-        assert_array_equal(distribution.result().forces(), forces)
+        atol = 1e-9 * np.linalg.norm(wrench) if warm else 0.0
+        for _ in range(2):  # and the same again, on what the first solution has left
+            assert distribution.solve(wrench) == status
+            assert_allclose(distribution.result().forces(), forces, rtol=0, atol=atol)
+            assert distribution.result().isOptimal()
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, WrenchDistribution.copy])
 def test_copies_share_nothing(copied):
     contacts, wrench = reachable(np.random.default_rng(3))
     distribution = distribution_of(contacts)
+    distribution.setWarmStart(False)  # so that the same problem again takes the same steps
     assert distribution.solve(wrench) == SOLVED
     forces = distribution.result().forces()
     other = copied(distribution)
@@ -1016,6 +1023,245 @@ def test_copies_share_nothing(copied):
     other.clear()
     assert distribution.solve(wrench) == SOLVED
     assert_array_equal(distribution.result().forces(), forces)
+
+
+# How it is solved: from where it starts, how long, and what is kept for the next time.
+
+
+def add_in_slots(
+    distribution: WrenchDistribution, contacts: list[ContactBase], slots: list[int]
+) -> None:
+    distribution.clear()
+    for contact, slot in zip(contacts, slots, strict=True):
+        distribution.add(contact, slot)
+
+
+@THOROUGH
+@given(seeds)
+def test_warm_start_changes_no_answer(seed):
+    """Of contacts that move, come and go, in their slots, and of wrenches in reach or not."""
+    rng = np.random.default_rng(seed)
+    contacts, wrench = reachable(rng)
+    warm = WrenchDistribution()
+    for slot, contact in enumerate(contacts):
+        warm.reserve(contact, slot)
+    for _ in range(5):
+        slots = list(rng.permutation(len(contacts))[: rng.integers(1, len(contacts) + 1)])
+        moving = [contacts[slot] for slot in slots]
+        for contact in moving:
+            step = pin.SE3(pin.exp3(rng.uniform(-0.05, 0.05, 3)), rng.uniform(-0.02, 0.02, 3))
+            contact.updateNewtonEuler(np.array([0.1, 0.2, 0.8]), contact.getPose() * step)
+        asked = wrench + 30.0 * rng.standard_normal(6)
+        add_in_slots(warm, moving, slots)
+        cold = distribution_of(moving)
+        cold.setWarmStart(False)
+        assert warm.solve(asked) == cold.solve(asked)
+        result, expected = warm.result(), cold.result()
+        tolerance = 1e-9 * np.linalg.norm(asked)
+        assert_allclose(result.achieved, expected.achieved, rtol=0, atol=tolerance)
+        assert_allclose(result.forces(), expected.forces(), rtol=0, atol=10 * tolerance)
+        assert result.isOptimal()
+
+
+def at_a_corner(contacts: list[ContactBase]) -> np.ndarray:
+    """A wrench for which many inequalities are active."""
+    settings = [contact.getSettings() for contact in contacts]
+    forces = [
+        np.array([s.mu, s.mu, 1.0, s.half_width, s.half_length, s.gu]) * 100.0 * (number + 1)
+        for number, s in enumerate(settings)
+    ]
+    return wrench_of(contacts, forces)
+
+
+def test_warm_start_saves_steps():
+    """From the active inequalities of the answer there is but one to it; that is the default."""
+    contacts = line_of_soles(-0.5, 0.5)
+    hard = 0.999 * at_a_corner(contacts)
+    distribution = distribution_of(contacts)
+    assert distribution.getWarmStart() is True
+    assert distribution.solve(hard) == SOLVED
+    cold_steps = distribution.result().iterations
+    assert cold_steps > 2
+    for warm, steps in ((True, 1), (False, cold_steps), (True, 1)):
+        distribution.setWarmStart(warmStart=warm)
+        assert distribution.getWarmStart() is warm
+        assert distribution.solve(hard) == SOLVED
+        assert distribution.result().iterations == steps
+        assert distribution.result().isOptimal()
+    # It is the slots that remember, in whatever order they take part.
+    add_in_slots(distribution, contacts[::-1], [1, 0])
+    assert distribution.solve(hard) == SOLVED
+    assert distribution.result().iterations == 1
+    # A copy remembers as well, and reset() forgets.
+    other = distribution.copy()
+    assert other.solve(hard) == SOLVED
+    assert other.result().iterations == 1
+    other.reset()
+    for contact in contacts:
+        other.add(contact)
+    assert other.solve(hard) == SOLVED
+    assert other.result().iterations == cold_steps
+
+
+@CALM
+@given(seeds)
+def test_maximal_iterations(seed):
+    """As many as a problem takes are enough; one less is not, and forces are those of before."""
+    rng = np.random.default_rng(seed)
+    contacts, wrench = reachable(rng)
+    distribution = distribution_of(contacts)
+    distribution.setWarmStart(False)
+    status = distribution.solve(wrench)
+    needed, expected = distribution.result().iterations, distribution.result().forces()
+    assert distribution.solve(2.0 * expected.max() * np.eye(6)[2]) in (SOLVED, RELAXED)
+    kept = distribution.result().forces()
+    for number in {1, needed // 2, needed - 1} - {0, needed}:
+        distribution.setMaximalIterations(maximalIterations=number)
+        assert distribution.getMaximalIterations() == number
+        assert distribution.solve(wrench) == DistributionStatus.NumericalFailure
+        assert_no_answer(distribution, kept)
+        assert distribution.result().iterations <= number
+    for number in (needed, needed + 1, 10 * needed):
+        distribution.setMaximalIterations(number)
+        assert distribution.solve(wrench) == status
+        assert_array_equal(distribution.result().forces(), expected)
+        assert distribution.result().iterations == needed
+
+
+def test_no_iterations_are_enough_where_none_are_needed():
+    """Without contacts, without a wrench, without numbers."""
+    distribution = WrenchDistribution()
+    distribution.setMaximalIterations(1)
+    assert distribution.solve(np.ones(6)) == DistributionStatus.NoContact
+    distribution.add(line_of_soles(0.0)[0])
+    assert distribution.solve(np.zeros(6)) == SOLVED
+    assert distribution.solve(np.full(6, np.nan)) == DistributionStatus.InvalidInput
+
+
+@pytest.mark.parametrize("number", [0, -1])
+def test_maximal_iterations_out_of_range(number):
+    distribution, _, wrench = ready()
+    assert distribution.getMaximalIterations() == WrenchDistribution.kMaximalIterations == 10000
+    distribution.setMaximalIterations(7)
+    with pytest.raises(ValueError, match=f"^maximalIterations must be > 0, got {number}$"):
+        distribution.setMaximalIterations(number)
+    for wrong in (None, 2.0, "2"):
+        with pytest.raises(TypeError):
+            distribution.setMaximalIterations(wrong)
+    assert distribution.getMaximalIterations() == 7
+    assert distribution.solve(wrench) == SOLVED
+
+
+@CALM
+@given(seeds)
+def test_slots_change_no_answer(seed):
+    """Shares are in the order of add(), whatever the slots."""
+    rng = np.random.default_rng(seed)
+    contacts, wrench = reachable(rng)
+    status, forces = distribute(contacts, wrench)
+    distribution = WrenchDistribution()
+    slots = list(rng.permutation(len(contacts) + 2)[: len(contacts)])
+    for slot in range(len(contacts) + 2):  # slots are there before they are taken in any order
+        distribution.reserve(contact=contacts[0], slot=slot)
+    for _ in range(2):
+        add_in_slots(distribution, contacts, slots)
+        assert distribution.solve(wrench) == status
+        result = distribution.result()
+        assert_allclose(result.forces(), forces, rtol=0, atol=1e-9 * np.linalg.norm(wrench))
+        for share, contact in zip(result.contacts, contacts, strict=True):
+            assert_array_equal(share.NE, contact.ne_A())
+            assert_array_equal(share.A, inequalities(contact))
+            assert_array_equal(share.weights, contact.reg_A())
+        assert result.isOptimal()
+
+
+def test_slots_that_cannot_be_taken():
+    """Nothing has changed: the contacts added before are still those of the problem."""
+    contacts = line_of_soles(-0.5, 0.0, 0.5)
+    distribution = WrenchDistribution()
+    distribution.add(contacts[0], np.int64(0))
+    distribution.add(contact=contacts[1], slot=1)
+    for slot in (0, 1):
+        with pytest.raises(ValueError, match=f"slot {slot} is taken already"):
+            distribution.add(contacts[2], slot)
+    for call in (distribution.add, distribution.reserve):
+        with pytest.raises(ValueError, match="slot must be at most 2, .*got 3"):
+            call(contacts[2], 3)
+        with pytest.raises(OverflowError):
+            call(contacts[2], -1)
+        with pytest.raises(ValueError, match="never initialised"):
+            call(ContactPoint(), 2)
+        for wrong in (None, 1.0, "1"):
+            with pytest.raises(TypeError):
+                call(contacts[2], wrong)
+    with pytest.raises(NotReadyError, match=r"before updateNewtonEuler\(\)"):
+        distribution.add(sole(), 2)
+    wrench = np.array([0.0, 0.0, 500.0, 0.0, 0.0, 0.0])
+    status, forces = distribute(contacts[:2], wrench)
+    assert distribution.solve(wrench) == status
+    assert_allclose(distribution.result().forces(), forces, rtol=0, atol=1e-12)
+    # By its matrices, a contact takes the slot of its position, too.
+    distribution.clear()
+    distribution.add(contacts[0], 1)
+    with pytest.raises(ValueError, match="slot 1 is taken already"):
+        distribution.add(A, WEIGHTS, NE)
+
+
+def test_forces_belong_to_slots():
+    """The same contacts in other slots are others: without an answer, their forces are zero."""
+    distribution, contacts, wrench = ready()
+    kept = distribution.result().forces()
+    for slots, expected in (([0, 1], kept), ([1, 0], np.zeros(12)), ([0, 1], np.zeros(12))):
+        add_in_slots(distribution, contacts, slots)
+        assert distribution.solve(np.full(6, np.nan)) == DistributionStatus.InvalidInput
+        assert_array_equal(distribution.result().forces(), expected)
+    assert distribution.solve(wrench) == SOLVED
+
+
+def test_reserve_changes_nothing():
+    """Neither the problem at hand nor its answer."""
+    distribution, contacts, wrench = ready()
+    before = repr(distribution.result())
+    distribution.reserve(point(mu=0.5), 2)
+    assert repr(distribution.result()) == before
+    assert distribution.solve(wrench) == SOLVED
+    assert len(distribution.result().contacts) == 2
+    add_in_slots(distribution, contacts, [2, 0])
+    assert distribution.solve(wrench) == SOLVED
+    assert distribution.result().isOptimal()
+
+
+def test_reset():
+    """As new, but for weights and settings."""
+    distribution, contacts, wrench = ready()
+    distribution.setWrenchWeights(np.full(6, 2.0))
+    distribution.setWarmStart(False)
+    distribution.setMaximalIterations(5)
+    distribution.reset()
+    assert repr(distribution.result()) == repr(WrenchDistribution().result())
+    assert_array_equal(distribution.getWrenchWeights(), np.full(6, 2.0))
+    assert distribution.getWarmStart() is False
+    assert distribution.getMaximalIterations() == 5
+    with pytest.raises(ValueError, match="slot must be at most 0"):
+        distribution.add(contacts[0], 1)
+    assert distribution.solve(wrench) == DistributionStatus.NoContact
+    for contact in contacts:
+        distribution.add(contact)
+    assert distribution.solve(np.full(6, np.nan)) == DistributionStatus.InvalidInput
+    assert_array_equal(distribution.result().forces(), np.zeros(12))
+    assert distribution.solve(wrench) == SOLVED
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, WrenchDistribution.copy])
+def test_copies_have_the_settings(copied):
+    distribution, _, _ = ready()
+    distribution.setWarmStart(False)
+    distribution.setMaximalIterations(3)
+    other = copied(distribution)
+    distribution.setWarmStart(True)
+    distribution.setMaximalIterations(4)
+    assert other.getWarmStart() is False
+    assert other.getMaximalIterations() == 3
 
 
 def test_wrenches_of_any_kind():
