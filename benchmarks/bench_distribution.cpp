@@ -3,49 +3,56 @@
 // matrices prepared beforehand; distributeForce has to place the contacts and prepare them each
 // time. Where the wrench is out of reach they have no answer: there a feasible problem of the same
 // contacts is what they are given.
-#include <benchmark/benchmark.h>
-
-#include <eiquadprog/eiquadprog-fast.hpp>
-#include <eiquadprog/eiquadprog-rt.hpp>
-#include <eiquadprog/eiquadprog.hpp>
-#include <functional>
+//
+// Each wrench comes with neighbours, and all solvers go round them: that one problem is solved
+// again and again, with all branches predicted, would say little about a controller, and nothing
+// about a warm start.
+#include <cmath>
+#include <optional>
 #include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
 
+#include "cases.hpp"
 #include "robots.hpp"
 
+namespace dynacom::benchmarks {
 namespace {
 
-using dynacom::DistributionStatus;
-using dynacom::DynaCoM;
-using dynacom::benchmarks::kFriction, dynacom::benchmarks::kYawFriction;
-using dynacom::benchmarks::kHalfLength, dynacom::benchmarks::kHalfWidth;
-using dynacom::benchmarks::makeQuadruped, dynacom::benchmarks::makeTalos;
-using Wrench = Eigen::Matrix<double, 6, 1>;
+constexpr int kNeighbours = 8;
 
-constexpr int kForces = 12, kEqualities = 6, kSoleInequalities = 22;
-
-// A wrench about the CoM of a robot whose computeDynamics() was called, at rest.
-using MakeWrench = std::function<Wrench(const DynaCoM&)>;
+// A wrench for a robot whose computeDynamics() was called, at rest. The angle goes round the
+// neighbours, from 0 to 2π.
+using MakeWrench = std::function<Wrench(const DynaCoM& robot, double angle)>;
 
 // What is asked of which robot's contacts.
 struct Task {
   std::string name;
-  DynaCoM (*makeRobot)();
+  std::function<DynaCoM()> makeRobot;
   MakeWrench makeWrench;
+  int active = -1;  // how many inequalities are, if it matters
   DistributionStatus status = DistributionStatus::Solved;
+  bool steps = false;  // whether the last foot is lifted for every other wrench
 };
 
 // Standing still, but for a force and a moment from outside.
 MakeWrench pushed(double fx, double fy, double fz, double mx, double my, double mz) {
-  return [=](const DynaCoM& robot) {
-    Wrench wrench, push;
-    wrench << robot.getGroundCoMForce(), robot.getGroundCoMTorque();
+  return [=](const DynaCoM& robot, double angle) {
+    Wrench push, change;
     push << fx, fy, fz, mx, my, mz;
-    return Wrench(wrench - push);
+    change << 3. * std::sin(angle), 3. * std::cos(angle), 1.5 * std::sin(2. * angle),
+        0.6 * std::cos(angle), 0.6 * std::sin(angle), 0.6 * std::sin(3. * angle);
+    return Wrench(groundWrench(robot) - push - change);
   };
+}
+
+// The sum of what contacts can give: the i-th of them the force of that number.
+Wrench sumOfForces(const DynaCoM& robot, const std::function<Wrench(int)>& makeForce) {
+  Wrench wrench = Wrench::Zero();
+  int number = 0;
+  for (const std::string& name : robot.getActiveContacts()) {
+    const ContactBase& contact = *robot.getContact(name);
+    wrench += contact.ne_A() * makeForce(number++).head(contact.cols());
+  }
+  return wrench;
 }
 
 // On the boundary of what the contacts can give: all of them push as far along x as friction holds,
@@ -53,161 +60,190 @@ MakeWrench pushed(double fx, double fy, double fz, double mx, double my, double 
 // same share of their limits: 1 is the corner of a cone, where two sides of the friction pyramid,
 // two edges of a sole and its yaw friction meet.
 MakeWrench onBoundary(const std::vector<double>& shares) {
-  return [shares](const DynaCoM& robot) {
-    Wrench wrench = Wrench::Zero();
-    double load = 0.;
-    auto share = shares.begin();
-    for (const std::string& name : robot.getActiveContacts()) {
-      const dynacom::ContactBase& contact = *robot.getContact(name);
+  return [shares](const DynaCoM& robot, double angle) {
+    return sumOfForces(robot, [&](int number) {
       Wrench force;
       force << 0., kFriction, 0., kHalfWidth, kHalfLength, kYawFriction;
-      force *= *share++;
+      force *= shares[number];
       force[0] = kFriction;
       force[2] = 1.;
-      load += 100.;
-      wrench += load * contact.ne_A() * force.head(contact.cols());
-    }
-    return wrench;
+      return Wrench((100. * (number + 1) + 5. * std::sin(angle + number)) * force);
+    });
   };
 }
 
-// A robot with that wrench to distribute, and the same as a quadratic program: minimise ½ xᵀ H x,
-// subject to CE x + ce0 = 0 and CI x + ci0 ≥ 0.
-struct Problem {
-  explicit Problem(const Task& task) : robot(task.makeRobot()) {
-    robot.setWarmStart(false);
-    const pinocchio::Model& model = robot.getModel();
-    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(model.nv);
-    robot.computeDynamics(pinocchio::neutral(model), zero, zero);
-    wrench = task.makeWrench(robot);
-    if (distribute() != task.status)
-      throw std::logic_error("the wrench '" + task.name + "' is not what it was chosen for");
+// Each contact carries its share of the weight, and leans a little.
+Wrench carried(const DynaCoM& robot, double angle) {
+  const double share = groundWrench(robot)[2] / double(robot.getActiveContacts().size());
+  return sumOfForces(robot, [=](int number) {
+    Wrench force = Wrench::Zero();
+    force.head<3>() << 0.02 * std::cos(angle), 0.02 * std::sin(angle),
+        1. + 0.02 * std::sin(angle + number);
+    return Wrench(share * force);
+  });
+}
 
-    H = robot.reg_A().cwiseAbs2().asDiagonal();
-    CE = robot.ne_A();
-    ce0 = -wrench;
-    const Eigen::MatrixXd U = robot.uni_A(), C = robot.fri_A();
-    CI.resize(U.rows() + C.rows(), kForces);
-    CI << -U, -C;
-    ci0.setZero(CI.rows());
+int countActive(const DistributionResult& distribution) {
+  int active = 0;
+  for (const DistributionResult::Contact& contact : distribution.contacts)
+    active += int((contact.multipliers.array() > 1e-9 * distribution.scale).count());
+  return active;
+}
+
+// A robot, its wrenches, and the same as quadratic programs.
+class Problem {
+ public:
+  Problem(const Task& task, bool warmStart) : steps_(task.steps), robot_(task.makeRobot()) {
+    robot_.setWarmStart(warmStart);
+    const pinocchio::Model& model = robot_.getModel();
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(model.nv);
+    robot_.computeDynamics(pinocchio::neutral(model), rest, rest);
+    foot_ = robot_.getActiveContacts().back();
+    for (int i = 0; i < kNeighbours; ++i) {
+      if (steps_) step(i);
+      wrenches_.push_back(task.makeWrench(robot_, 2. * std::acos(-1.) * i / kNeighbours));
+      if (distribute(robot_, wrenches_.back()) != task.status ||
+          (task.active >= 0 && countActive(robot_.getDistribution()) != task.active))
+        throw std::logic_error("a wrench of '" + task.name + "' is not what it was chosen for");
+      programs_.push_back(makeProgram(robot_));
+    }
   }
 
-  DistributionStatus distribute() {
-    return robot.distributeForce(wrench.head<3>(), wrench.tail<3>(), robot.getCoM());
+  // distributeForce for the next wrench.
+  void solve() {
+    if (steps_) step(next_);
+    distribute(robot_, wrenches_[next_]);
+    next_ = (next_ + 1) % kNeighbours;
   }
 
-  // A solver that answers another question would be no reference.
-  void check(const Eigen::VectorXd& forces) const {
-    if (!forces.isApprox(robot.allForces(), 1e-6))
-      throw std::logic_error("the reference's forces differ");
+  // The same by a general solver, to be called again and again.
+  std::function<void()> makeReference(const std::string& variant) {
+    std::vector<std::shared_ptr<Eiquadprog>> solvers;  // one for all, or one with each foot
+    for (int i = 0; i < kNeighbours; ++i) {
+      if (i < (steps_ ? 2 : 1)) {
+        solvers.push_back(makeEiquadprog(variant));
+        solvers.back()->prepare(programs_[i]);
+      }
+      solve();
+      requireSameForces(robot_, solvers[i % solvers.size()]->solve(programs_[i].ce0));
+    }
+    return [programs = programs_, solvers, next = 0]() mutable {
+      solvers[next % solvers.size()]->solve(programs[next].ce0);
+      next = (next + 1) % kNeighbours;
+    };
   }
 
-  DynaCoM robot;
-  Wrench wrench;
-  Eigen::MatrixXd H, CE, CI;
-  Eigen::VectorXd ce0, ci0;
-  Eigen::VectorXd g0 = Eigen::VectorXd::Zero(kForces);
+ private:
+  void step(int number) {
+    if (number % 2)
+      robot_.deactivateContact(foot_);
+    else
+      robot_.activateContact(foot_);
+  }
+
+  bool steps_;
+  DynaCoM robot_;
+  std::string foot_;
+  std::vector<Wrench> wrenches_;
+  std::vector<QuadraticProgram> programs_;
+  int next_ = 0;
 };
 
-void distributeForce(benchmark::State& state, const Task& task, const std::string& reference) {
-  Problem problem(task);
-  for (auto _ : state) benchmark::DoNotOptimize(problem.distribute());
-  state.SetLabel("reference=" + reference);
-  state.counters["iterations"] = problem.robot.getDistribution().iterations;
+Case ours(const Task& task, bool warmStart, const std::string& variant,
+          const std::string& reference) {
+  const auto prepare = [task, warmStart] {
+    const auto problem = std::make_shared<Problem>(task, warmStart);
+    return [problem] { problem->solve(); };
+  };
+  return {"distributeForce/" + task.name + (warmStart ? "/warm" : "") + "/vs_" + variant, prepare,
+          "eiquadprog/" + variant + "/" + reference};
 }
 
-void eiquadprogPlain(benchmark::State& state, const Task& task) {
-  const Problem problem(task);
-  const Eigen::MatrixXd CE = problem.CE.transpose(), CI = problem.CI.transpose();
-  Eigen::MatrixXd H(kForces, kForces);
-  Eigen::VectorXd g0 = problem.g0, x(kForces);
-  Eigen::VectorXi active(CI.cols() + kEqualities);
-  std::size_t active_size = 0;
-  for (auto _ : state) {
-    H = problem.H;  // it is overwritten
-    benchmark::DoNotOptimize(eiquadprog::solvers::solve_quadprog(
-        H, g0, CE, problem.ce0, CI, problem.ci0, x, active, active_size));
+// A wrench for each solver, and for distributeForce once for every solver it is measured against;
+// with a warm start against the fast one only.
+void addSolved(std::vector<Case>& cases, const Task& task,
+               const std::vector<std::string>& variants = {"fast"}) {
+  for (const std::string& variant : variants) {
+    cases.push_back({"eiquadprog/" + variant + "/" + task.name,
+                     [task, variant] { return Problem(task, false).makeReference(variant); }});
+    cases.push_back(ours(task, false, variant, task.name));
   }
-  problem.check(x);
-  state.counters["active inequalities"] = double(active_size) - kEqualities;
+  cases.push_back(ours(task, true, "fast", task.name));
 }
 
-void eiquadprogFast(benchmark::State& state, const Task& task) {
-  const Problem problem(task);
-  eiquadprog::solvers::EiquadprogFast solver;
-  solver.reset(kForces, kEqualities, problem.CI.rows());
-  Eigen::VectorXd x(kForces);
-  for (auto _ : state)
-    benchmark::DoNotOptimize(solver.solve_quadprog(problem.H, problem.g0, problem.CE, problem.ce0,
-                                                   problem.CI, problem.ci0, x));
-  problem.check(x);
-  state.counters["active inequalities"] = double(solver.getActiveSetSize()) - kEqualities;
+// A wrench for which eiquadprog has no answer, against another one that it has one for.
+void addUnequal(std::vector<Case>& cases, const Task& task, const std::string& reference) {
+  for (const bool warmStart : {false, true})
+    cases.push_back(ours(task, warmStart, "fast", reference));
 }
 
-// For two soles.
-void eiquadprogRt(benchmark::State& state, const Task& task) {
-  const Problem problem(task);
-  const Eigen::Matrix<double, kForces, kForces> H = problem.H;
-  const Eigen::Matrix<double, kEqualities, kForces> CE = problem.CE;
-  const Eigen::Matrix<double, kSoleInequalities, kForces> CI = problem.CI;
-  const Eigen::Matrix<double, kForces, 1> g0 = problem.g0;
-  const Eigen::Matrix<double, kEqualities, 1> ce0 = problem.ce0;
-  const Eigen::Matrix<double, kSoleInequalities, 1> ci0 = problem.ci0;
-  Eigen::Matrix<double, kForces, 1> x;
-  eiquadprog::solvers::RtEiquadprog<kForces, kEqualities, kSoleInequalities> solver;
-  for (auto _ : state) benchmark::DoNotOptimize(solver.solve_quadprog(H, g0, CE, ce0, CI, ci0, x));
-  problem.check(x);
-}
-
-using Solver = std::pair<std::string, void (*)(benchmark::State&, const Task&)>;
-const Solver kPlain = {"plain", eiquadprogPlain};
-const Solver kFast = {"fast", eiquadprogFast};
-const Solver kRt = {"rt", eiquadprogRt};
-
-// A wrench with each solver, and distributeForce once for every solver it is measured against.
-void registerSolved(const Task& task, const std::vector<Solver>& solvers) {
-  for (const auto& [variant, solve] : solvers) {
-    const std::string reference = "eiquadprog/" + variant + "/" + task.name;
-    const std::string ours = "distributeForce/" + task.name + "/vs_" + variant;
-    benchmark::RegisterBenchmark(reference.c_str(), solve, task);
-    benchmark::RegisterBenchmark(ours.c_str(), distributeForce, task, reference);
-  }
-}
-
-// A wrench that is out of reach, against a feasible one of the same contacts.
-void registerRelaxed(Task task, const std::string& feasible) {
+void addRelaxed(std::vector<Case>& cases, Task task, const std::string& feasible) {
   task.status = DistributionStatus::Relaxed;
-  const std::string ours = "distributeForce/" + task.name + "/vs_fast";
-  const std::string reference = "eiquadprog/fast/" + feasible;
-  benchmark::RegisterBenchmark(ours.c_str(), distributeForce, task, reference);
+  addUnequal(cases, task, feasible);
 }
 
-[[maybe_unused]] const bool registered = [] {
-  const MakeWrench pyramid = onBoundary({0.4, -0.6, 0.6, -0.8}),
-                   corner = onBoundary({1., 1., 1., 1.});
-
-  // Well inside what the contacts can give, and where several inequalities are active.
-  registerSolved({"soles/inside", makeTalos, pushed(0., 0., 0., 0., 0., 0.)}, {kPlain, kFast, kRt});
-  registerSolved({"soles/edge", makeTalos, pushed(60., -60., 0., 20., 30., 60.)},
-                 {kPlain, kFast, kRt});
-  registerSolved({"soles/pyramid", makeTalos, pyramid}, {kFast});
-  registerSolved({"soles/corner", makeTalos, corner}, {kFast});
-  registerSolved({"points/inside", makeQuadruped, pushed(0., 0., 0., 0., 0., 0.)}, {kFast});
-  registerSolved({"points/edge", makeQuadruped, pushed(120., -60., 0., 10., 40., 30.)}, {kFast});
-  registerSolved({"points/pyramid", makeQuadruped, pyramid}, {kFast});
-  registerSolved({"points/corner", makeQuadruped, corner}, {kFast});
-
-  // More than friction holds, more than the weight holds down, and as much as lifts the robot.
-  registerRelaxed({"soles/slipping", makeTalos, pushed(800., 300., 0., 0., 0., 0.)}, "soles/edge");
-  registerRelaxed({"soles/tipping", makeTalos, pushed(0., 0., 0., 100., 200., 0.)}, "soles/edge");
-  registerRelaxed({"soles/lifted", makeTalos, pushed(50., 0., 2000., 0., 0., 0.)}, "soles/edge");
-  registerRelaxed({"points/slipping", makeQuadruped, pushed(500., 200., 0., 0., 0., 0.)},
-                  "points/edge");
-  registerRelaxed({"points/tipping", makeQuadruped, pushed(0., 0., 0., 200., 300., 0.)},
-                  "points/edge");
-  registerRelaxed({"points/lifted", makeQuadruped, pushed(50., 0., 1000., 0., 0., 0.)},
-                  "points/edge");
-  return true;
-}();
+// Reading a robot takes long: it is done once, where the robot is wanted at all.
+std::function<DynaCoM()> once(const std::function<DynaCoM()>& makeRobot) {
+  return [makeRobot, robot = std::make_shared<std::optional<DynaCoM>>()] {
+    if (!*robot) *robot = makeRobot();
+    return **robot;
+  };
+}
 
 }  // namespace
+
+std::vector<Case> makeCases() {
+  const auto talos = once(makeTalos), quadruped = once(makeQuadruped);
+  const MakeWrench still = pushed(0., 0., 0., 0., 0., 0.),
+                   pyramid = onBoundary({0.4, -0.6, 0.6, -0.8}),
+                   corner = onBoundary({1., 1., 1., 1.});
+  std::vector<Case> cases;
+
+  // Well inside what the contacts can give, and where inequalities are active.
+  addSolved(cases, {"soles/inside", talos, still, 0}, {"plain", "fast", "rt"});
+  addSolved(cases, {"soles/active2", talos, pushed(-10., 50., 0., -10., -10., 0.), 2});
+  addSolved(cases, {"soles/active3", talos, pushed(-80., 90., -10., 0., 10., 0.), 3});
+  addSolved(cases, {"soles/active4", talos, pushed(60., -60., 0., 20., 30., 60.), 4},
+            {"plain", "fast", "rt"});
+  addSolved(cases, {"soles/active5", talos, pushed(0., 140., -40., 0., -10., 10.), 5});
+  addSolved(cases, {"soles/active6", talos, pushed(80., 130., 30., 0., 0., -20.), 6});
+  addSolved(cases, {"soles/pyramid", talos, pyramid});
+  addSolved(cases, {"soles/corner", talos, corner});
+  addSolved(cases, {"points/inside", quadruped, still, 0});
+  addSolved(cases, {"points/edge", quadruped, pushed(120., -60., 0., 10., 40., 30.)});
+  addSolved(cases, {"points/pyramid", quadruped, pyramid});
+  addSolved(cases, {"points/corner", quadruped, corner});
+
+  // A foot is lifted or put down in each tick.
+  for (const auto& [name, robot] : {std::pair("soles/step", talos), {"points/step", quadruped}}) {
+    Task task = {name, robot, carried};
+    task.steps = true;
+    addSolved(cases, task);
+  }
+
+  // More than friction holds, more than the weight holds down, and as much as lifts the robot.
+  addRelaxed(cases, {"soles/slipping", talos, pushed(800., 300., 0., 0., 0., 0.)}, "soles/active4");
+  addRelaxed(cases, {"soles/tipping", talos, pushed(0., 0., 0., 100., 200., 0.)}, "soles/active4");
+  addRelaxed(cases, {"soles/lifted", talos, pushed(50., 0., 2000., 0., 0., 0.)}, "soles/active4");
+  addRelaxed(cases, {"points/slipping", quadruped, pushed(500., 200., 0., 0., 0., 0.)},
+             "points/edge");
+  addRelaxed(cases, {"points/tipping", quadruped, pushed(0., 0., 0., 200., 300., 0.)},
+             "points/edge");
+  addRelaxed(cases, {"points/lifted", quadruped, pushed(50., 0., 1000., 0., 0., 0.)},
+             "points/edge");
+
+  // Growth with the number of contacts. One point or two cannot give every wrench, which leaves
+  // eiquadprog with equations that depend on each other, and without an answer.
+  for (const int number : {1, 2, 3, 4, 6, 8, 10, 12, 14, 16}) {
+    const std::string size = std::to_string(number) + "/inside";
+    const Task points = {"points" + size, [number] { return makePoints(number); }, carried, 0};
+    if (number < 3)
+      addUnequal(cases, points, "points3/inside");
+    else
+      addSolved(cases, points);
+    addSolved(cases, {"soles" + size, [number] { return makeSoles(number); }, carried, 0});
+  }
+  return cases;
+}
+
+}  // namespace dynacom::benchmarks

@@ -1,45 +1,68 @@
 // SPDX-License-Identifier: BSD-2-Clause
-// What does computeDynamics cost beside the call of Pinocchio that it cannot do without?
-#include <benchmark/benchmark.h>
-
+// What does computeDynamics cost beside the call of Pinocchio that it cannot do without? And what
+// does a controller's whole tick cost, to be compared with the same in Python?
 #include <pinocchio/algorithm/centroidal.hpp>
 
+#include "cases.hpp"
 #include "robots.hpp"
 
+namespace dynacom::benchmarks {
 namespace {
 
-using dynacom::DynaCoM;
-
-// A motion without symmetries, the same every time.
-struct Posture {
-  explicit Posture(const pinocchio::Model& model)
-      : q(pinocchio::neutral(model)),
-        v(Eigen::VectorXd::LinSpaced(model.nv, -0.5, 0.5)),
-        a(Eigen::VectorXd::LinSpaced(model.nv, 1., -1.)) {
-    q.tail(model.nq - 7).setLinSpaced(-0.2, 0.3);
-  }
+struct Motion {
   Eigen::VectorXd q, v, a;
 };
 
-void computeCentroidalMomentumTimeVariation(benchmark::State& state) {
-  const DynaCoM talos = dynacom::benchmarks::makeTalos();
-  pinocchio::Data data(talos.getModel());
-  const Posture posture(talos.getModel());
-  for (auto _ : state)
-    benchmark::DoNotOptimize(pinocchio::computeCentroidalMomentumTimeVariation(
-        talos.getModel(), data, posture.q, posture.v, posture.a));
+// A motion without symmetries, the same every time.
+Motion makeMotion(const pinocchio::Model& model) {
+  Motion motion = {pinocchio::neutral(model), Eigen::VectorXd::LinSpaced(model.nv, -0.5, 0.5),
+                   Eigen::VectorXd::LinSpaced(model.nv, 1., -1.)};
+  motion.q.tail(model.nq - 7).setLinSpaced(-0.2, 0.3);
+  return motion;
 }
-BENCHMARK(computeCentroidalMomentumTimeVariation);
 
-void computeDynamics(benchmark::State& state) {
-  DynaCoM talos = dynacom::benchmarks::makeTalos();
-  const Posture posture(talos.getModel());
-  for (auto _ : state) {
-    talos.computeDynamics(posture.q, posture.v, posture.a);
-    benchmark::DoNotOptimize(talos.getCoP().data());
-  }
-  state.SetLabel("reference=computeCentroidalMomentumTimeVariation");
+std::function<void()> prepareReference() {
+  const pinocchio::Model model = makeTalos().getModel();
+  return [model, data = pinocchio::Data(model), motion = makeMotion(model)]() mutable {
+    pinocchio::computeCentroidalMomentumTimeVariation(model, data, motion.q, motion.v, motion.a);
+  };
 }
-BENCHMARK(computeDynamics);
+
+std::function<void()> prepareDynamics() {
+  DynaCoM talos = makeTalos();
+  return [talos, motion = makeMotion(talos.getModel())]() mutable {
+    talos.computeDynamics(motion.q, motion.v, motion.a);
+  };
+}
+
+std::function<void()> prepareDynamicsOfData() {
+  DynaCoM talos = makeTalos();
+  pinocchio::Data data(talos.getModel());
+  const Motion motion = makeMotion(talos.getModel());
+  pinocchio::computeCentroidalMomentumTimeVariation(talos.getModel(), data, motion.q, motion.v,
+                                                    motion.a);
+  return [talos, data]() mutable { talos.computeDynamics(data); };
+}
+
+// At rest in the neutral configuration, as in python_tick.py.
+std::function<void()> prepareTick() {
+  DynaCoM talos = makeTalos();
+  const Eigen::VectorXd q = pinocchio::neutral(talos.getModel());
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(talos.getModel().nv);
+  return [talos, q, rest]() mutable {
+    talos.computeDynamics(q, rest, rest);
+    talos.distributeForce(talos.getGroundCoMForce(), talos.getGroundCoMTorque(), talos.getCoM());
+  };
+}
 
 }  // namespace
+
+std::vector<Case> makeCases() {
+  const std::string reference = "computeCentroidalMomentumTimeVariation";
+  return {{reference, prepareReference},
+          {"computeDynamics", prepareDynamics, reference},
+          {"computeDynamics(data)", prepareDynamicsOfData, reference},
+          {"tick", prepareTick, reference}};
+}
+
+}  // namespace dynacom::benchmarks

@@ -1,0 +1,245 @@
+"""Keeps what was measured in docs/performance.json, and writes docs/performance.md from that.
+
+Of the page only the tables are written, between ``<!-- NAME -->`` and ``<!-- end of NAME -->``; the
+pictures are docs/performance_*.svg.
+"""
+
+import datetime
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import plots
+from measure import EIQUADPROG, JITTER_SORTS, OURS, PYTHON_BOUND, PYTHON_TICK, WAYS
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+RECORD = DOCS / "performance.json"
+
+# The goal of each row that has one, and what it is called.
+GOAL_TABLE = {
+    "distributeForce/soles/inside/vs_plain": ("2 soles, none active, cold", 0.15),
+    "distributeForce/soles/inside/vs_fast": ("2 soles, none active, cold", 0.20),
+    "distributeForce/soles/active2/vs_fast": ("2 soles, 2 active, cold", 0.5),
+    "distributeForce/soles/active3/vs_fast": ("2 soles, 3 active, cold", 0.5),
+    "distributeForce/soles/active4/vs_fast": ("2 soles, 4 active, cold", 0.5),
+    "distributeForce/soles/active5/vs_fast": ("2 soles, 5 active, cold", 0.5),
+    "distributeForce/soles/active6/vs_fast": ("2 soles, 6 active, cold", 0.5),
+    "distributeForce/soles/slipping/vs_fast": ("2 soles, slipping, cold", 1.0),
+    "distributeForce/soles/tipping/vs_fast": ("2 soles, tipping, cold", 1.0),
+    "distributeForce/soles/lifted/vs_fast": ("2 soles, lifted, cold", 1.0),
+    "distributeForce/points/slipping/vs_fast": ("4 points, slipping, cold", 1.0),
+    "distributeForce/points/tipping/vs_fast": ("4 points, tipping, cold", 1.0),
+    "distributeForce/points/lifted/vs_fast": ("4 points, lifted, cold", 1.0),
+    "distributeForce/points/inside/vs_fast": ("4 points, none active, cold", 0.25),
+    "distributeForce/points8/inside/vs_fast": ("8 points, none active, cold", 0.25),
+    "distributeForce/soles4/inside/vs_fast": ("4 soles, none active, cold", 0.25),
+    "distributeForce/walk/warm/vs_plain": ("the walk, warm, median", 0.15),
+    "distributeForce/walk/warm/calls/p99.9": ("the walk, warm, p99.9 of all calls", 3.0),
+    "distributeForce/walk/warm/ticks/p99.9": ("the walk, warm, p99.9 of ticks' medians", 3.0),
+    "computeDynamics": ("`computeDynamics`, Talos", 1.02),
+    "computeDynamics(data)": ("`computeDynamics(data)`, Talos", 0.1),
+    PYTHON_TICK: ("a tick from Python, Talos", 1.0),
+}
+GOALS = {name: goal for name, (_, goal) in GOAL_TABLE.items()}
+
+
+def to_json(value, *, depth=3):
+    """JSON with a line for each entry of the outer containers, so that changes can be read."""
+    if depth and isinstance(value, dict):
+        entries = [f"{json.dumps(key)}: {to_json(value[key], depth=depth - 1)}" for key in value]
+        return "{\n" + ",\n".join(entries) + "\n}"
+    if depth and isinstance(value, list) and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(map(json.dumps, value)) + "\n]"
+    return json.dumps(value)
+
+
+def machine():
+    """What figures were measured on, in a few words."""
+    processor = subprocess.run(["lscpu"], capture_output=True, text=True).stdout
+    model = re.search(r"Model name: *(.*)", processor)
+    compiler = subprocess.run(
+        [os.environ.get("CXX", "g++"), "-dumpfullversion"], capture_output=True, text=True
+    ).stdout.strip()
+    return (
+        f"{model[1] if model else platform.machine()}, {os.cpu_count()} cores, "
+        f"{platform.freedesktop_os_release()['PRETTY_NAME']}, g++ {compiler}"
+    )
+
+
+def record(part, result, *, rough):
+    """Put a result in the place of the last one of its part, and write the page."""
+    parts = json.loads(RECORD.read_text()) if RECORD.exists() else {}
+    today = datetime.date.today().isoformat()
+    parts[part] = {"date": today, "machine": machine(), "rough": rough, **result}
+    RECORD.write_text(to_json(dict(sorted(parts.items()))) + "\n")
+    write()
+
+
+# ---- Tables ----
+
+
+def markdown(header, rows):
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def microseconds(nanoseconds):
+    return f"{nanoseconds / 1000:.2f} µs"
+
+
+def show_reference(name):
+    """The name of a reference, as one says it."""
+    if name == PYTHON_BOUND:
+        return "2 × C++ + 3 µs"
+    if name == "computeCentroidalMomentumTimeVariation":
+        return "Pinocchio"
+    if name.endswith(", median"):
+        return "its median"
+    solver, variant, *problem = name.split("/")
+    return f"{solver} {variant}"
+
+
+def goal_rows(times):
+    """(what, row, goal) of all that there are goals for."""
+    rows = {row["name"]: row for row in times["rows"]}
+    return [(what, rows[name], goal) for name, (what, goal) in GOAL_TABLE.items()]
+
+
+def goals_table(times):
+    lines = []
+    for what, row, goal in goal_rows(times):
+        reference = microseconds(row["median_ns"] / row["ratio"])
+        lines.append(
+            (
+                what,
+                microseconds(row["median_ns"]),
+                f"{show_reference(row['reference'])}, {reference}",
+                f"{row['ratio']:.2f}" if row["ratio"] <= goal else f"**{row['ratio']:.2f}**",
+                f"≤ {goal:g}",
+            )
+        )
+    return markdown(("what", "measured", "reference", "ratio", "goal"), lines)
+
+
+def cases_table(times):
+    """distributeForce, cold and warm, beside eiquadprog fast."""
+    rows = {row["name"]: row for row in times["rows"]}
+    lines = []
+    for name, cold in rows.items():
+        found = re.fullmatch("distributeForce/(\\w+/\\w+)/vs_fast", name)
+        if not found or found[1].startswith("walk"):
+            continue
+        warm = rows[f"distributeForce/{found[1]}/warm/vs_fast"]
+        of = cold["reference"].removeprefix("eiquadprog/fast/")
+        time = microseconds(cold["median_ns"] / cold["ratio"])
+        lines.append(
+            (
+                found[1].replace("/", ", "),
+                microseconds(cold["median_ns"]),
+                microseconds(warm["median_ns"]),
+                time if of == found[1] else f"{time} ({of.replace('/', ', ')})",
+                f"{cold['ratio']:.2f}",
+                f"{warm['ratio']:.2f}",
+            )
+        )
+    header = ("case", "cold", "warm", "eiquadprog fast", "ratio, cold", "ratio, warm")
+    return markdown(header, lines)
+
+
+def walk_table(times):
+    rows = {row["name"]: row["median_ns"] for row in times["rows"]}
+    lines = []
+    for way in WAYS:
+        is_ours = way in OURS
+        medians = [
+            rows.get(f"{way}{support}/vs_fast" if is_ours else way + support)
+            for support in ("", "/single", "/double")
+        ]
+        percentiles = [
+            rows[f"{way}/{kind}/{label}"]
+            for kind in ("calls", "ticks")
+            for label in ("p99", "p99.9", "maximum")
+        ]
+        name = f"`distributeForce`, {way.split('/')[-1]}" if is_ours else way.split("/")[1]
+        if way in EIQUADPROG:
+            name = "eiquadprog " + name
+        cells = (f"{time / 1000:.2f}" if time else "" for time in medians + percentiles)
+        lines.append((name, *cells))
+    header = ["", "median", "one sole", "two soles", "p99", "p99.9", "maximum"]
+    header += ["ticks' p99", "ticks' p99.9", "ticks' maximum"]
+    return markdown(header, lines)
+
+
+def counts_table(counts):
+    lines = []
+    for row in counts["rows"]:
+        if row["name"] not in GOALS:
+            continue
+        lines.append(
+            (
+                GOAL_TABLE[row["name"]][0],
+                f"{row['instructions']:.0f}",
+                f"{show_reference(row['reference'])}, {row['instructions'] / row['ratio']:.0f}",
+                f"{row['ratio']:.2f}",
+            )
+        )
+    return markdown(("what", "instructions", "reference", "ratio"), lines)
+
+
+def jitter_table(jitter):
+    labels = ("median", "p99", "p99.9", "maximum")
+    lines = [
+        (sort, *(f"{jitter[sort][label] / 1000:.1f} µs" for label in labels))
+        for sort in JITTER_SORTS
+    ]
+    return markdown(("", *labels), lines)
+
+
+def jitter_conditions(jitter):
+    said = {True: "granted", False: "refused"}
+    return (
+        f"{jitter['ticks']} ticks in {jitter['minutes']:g} min on {jitter['cores']} cores; "
+        f"`SCHED_FIFO` was {said[jitter['fifo']]}, `mlockall` {said[jitter['locked']]}; "
+        f"a hypervisor took {jitter['stolen_s']:.1f} s away from the cores; "
+        f"{jitter['overruns']} ticks ended more than 1 ms after they were due."
+    )
+
+
+def provenance(part):
+    rough = ", roughly (`--quick`)" if part["rough"] else ""
+    return f"Measured on {part['date']}{rough}: {part['machine']}."
+
+
+def write():
+    """Write tables and pictures from docs/performance.json."""
+    parts = json.loads(RECORD.read_text()) if RECORD.exists() else {}
+    blocks, goals = {}, []
+    if times := parts.get("times"):
+        blocks["when"] = provenance(times)
+        blocks["goals"] = goals_table(times)
+        blocks["cases"] = cases_table(times)
+        blocks["walk"] = walk_table(times)
+        goals = [
+            (f"{what.replace('`', '')} / {show_reference(row['reference'])}", row["ratio"], goal)
+            for what, row, goal in goal_rows(times)
+        ]
+    if counts := parts.get("counts"):
+        blocks["counts"] = f"{provenance(counts)}\n\n{counts_table(counts)}"
+    if jitter := parts.get("jitter"):
+        conditions = f"{provenance(jitter)} {jitter_conditions(jitter)}"
+        blocks["jitter"] = f"{conditions}\n\n{jitter_table(jitter)}"
+
+    path = DOCS / "performance.md"
+    text = path.read_text()
+    for name, block in blocks.items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+        if text.count(begin) != 1 or text.count(end) != 1:
+            sys.exit(f"{path.name} has no place, or several, for {name}")
+        before, rest = text.split(begin)
+        text = before + begin + block + "\n" + rest[rest.index(end) :]
+    path.write_text(text)
+    plots.draw(parts, goals, DOCS)
