@@ -14,8 +14,11 @@ constexpr int kNormal = BoxCone::kNormal;
 
 // All of these are for a problem whose weighted wrench has unit size.
 
-// How many steps are taken without ε before the one with.
+// How many steps are taken without ε before those with, and from the state of the last answer.
 constexpr int kFreeSteps = 3;
+constexpr int kFreeStepsFromLast = 2;
+// For how many problems a contact may take no part, so that it begins where it left.
+constexpr std::size_t kShortAbsence = 10;
 // ε, as a part of the mean compliance: less, if the answer that it leads to is none.
 constexpr double kSlacks[] = {1e-3, 1e-4, 1e-6, 1e-8, 1e-11};
 constexpr int kMaximalSteps = 50;
@@ -180,12 +183,19 @@ void DualNewton::setContact(std::size_t slot, const Contact& contact) {
   block.e.setZero();
   block.has_pure_moments = false;
   block.state = State();
+  block.last_problem = problem_;
   block.is_free.setZero();
   block.edge.setZero();
+  block.inverse_stiffness = 0.;
 }
 
 void DualNewton::setActive(const std::vector<std::size_t>& slots,
                            const std::vector<Contact>& contacts) {
+  // Where a foot comes down, the state that it was lifted from says nothing.
+  for (const std::size_t slot : active_) blocks_[slot].last_problem = problem_;
+  for (const std::size_t slot : slots)
+    if (problem_ - blocks_[slot].last_problem > kShortAbsence)
+      blocks_[slot].last = blocks_[slot].free;
   active_ = slots;
   recognised_ = true;
   largest_weight_ = 0.;
@@ -203,12 +213,15 @@ void DualNewton::setActive(const std::vector<std::size_t>& slots,
 }
 
 // Begins with the states of the last answer, or with all components free but for those that are
-// always zero.
-void DualNewton::begin(bool from_last_answer) {
+// always zero. Returns whether that is another state than the latter.
+bool DualNewton::begin(bool from_last_answer) {
+  bool bound = false;
   for (const std::size_t slot : active_) {
     Block& block = blocks_[slot];
     enter(block, from_last_answer ? block.last : block.free);
+    bound = bound || !(block.state == block.free);
   }
+  return bound;
 }
 
 void DualNewton::enter(Block& block, const State& state) {
@@ -221,9 +234,9 @@ void DualNewton::enter(Block& block, const State& state) {
     block.edge[i] = state.loaded ? bound * block.betas[i] : 0.;
   }
   if (!state.loaded) return;
-  block.is_free[kNormal] = 0.;
+  block.is_free[kNormal] = 0.;  // but with those at their bounds
   block.edge[kNormal] = 1.;
-  block.edge /= block.edge.norm();
+  block.inverse_stiffness = 1. / block.edge.squaredNorm();
 }
 
 // The state that a pull wants. What x_z would have to be less,
@@ -232,30 +245,37 @@ void DualNewton::enter(Block& block, const State& state) {
 //
 // rises, ever less steeply: from zero on, where all that pull sideways are at their bounds,
 // Newton's method comes from the left, and lets go of one bound after the other.
+//
+// From another point it comes there with its first step.
 template <int kSize>
 DualNewton::State DualNewton::findState(const Block& block) {
   const Vector6& g = block.pull;
-  double normal = 0., held = std::numeric_limits<double>::infinity();
-  for (double former = held;; former = held) {
-    double numerator = g[kNormal], denominator = 1.;
-    held = 0.;
+  double sizes[kSize], is_held[kSize], normal = 0.;
+  for (int i = 0; i < kSize; ++i) {
+    sizes[i] = std::abs(g[i]);
+    is_held[i] = 1. - block.is_free[i];
+  }
+  for (int step = 0; step <= kSize; ++step) {
+    double numerator = g[kNormal], denominator = 1., changes = 0.;
     for (int i = 0; i < kSize; ++i) {
-      const double beta = block.betas[i], size = std::abs(g[i]);
-      const double is_held = size > beta * normal ? 1. : 0.;
-      numerator += is_held * beta * size;
-      denominator += is_held * beta * beta;
-      held += is_held;
+      const double held_beta = is_held[i] * block.betas[i];
+      numerator += held_beta * sizes[i];
+      denominator += held_beta * block.betas[i];
     }
-    if (held >= former) break;  // less and less, but for rounding
     normal = std::max(0., numerator / denominator);
+    for (int i = 0; i < kSize; ++i) {
+      const double holds = sizes[i] > block.betas[i] * normal ? 1. : 0.;
+      changes += std::abs(holds - is_held[i]);
+      is_held[i] = holds;
+    }
+    if (changes == 0.) break;
   }
   State state;
   state.loaded = normal > 0.;
   for (int i = 0; i < kSize; ++i) {
     const double beta = block.betas[i];
     const signed char side = g[i] < 0. && beta > 0. ? -1 : 1;
-    const bool is_held = beta == 0. || std::abs(g[i]) > beta * normal;
-    state.bounds[static_cast<std::size_t>(i)] = is_held ? side : 0;
+    state.bounds[static_cast<std::size_t>(i)] = is_held[i] != 0. || beta == 0. ? side : 0;
   }
   state.bounds[kNormal] = 0;
   return state;
@@ -273,7 +293,8 @@ EIGEN_STRONG_INLINE DualNewton::Vector6 DualNewton::pullOf(const Block& block,
 
 // The forces for a pull, as long as the state stays.
 DualNewton::Vector6 DualNewton::respond(const Block& block, const Vector6& pull) {
-  return block.is_free.cwiseProduct(pull) + block.edge.dot(pull) * block.edge;
+  return block.is_free.cwiseProduct(pull) +
+         (block.edge.dot(pull) * block.inverse_stiffness) * block.edge;
 }
 
 EIGEN_STRONG_INLINE void DualNewton::addWrench(const Block& block, const Vector6& force,
@@ -333,9 +354,9 @@ void DualNewton::correct(const Vector6& change) {
   }
 }
 
-// The wrench that a normal force, and what goes with it, of unit cost gives.
+// The wrench that a unit of the normal force, and what goes with it, gives.
 DualNewton::Vector6 DualNewton::normalWrench(const Block& block) {
-  if (block.edge[kNormal] == 1.) return block.e.col(kNormal);
+  if (block.inverse_stiffness == 1.) return block.e.col(kNormal);
   Vector6 wrench = Vector6::Zero();
   addWrench(block, block.edge, wrench);
   return wrench;
@@ -344,47 +365,56 @@ DualNewton::Vector6 DualNewton::normalWrench(const Block& block) {
 // How the wrench rises with its multipliers, as long as the state stays: the lower half.
 void DualNewton::assembleCompliance() {
   Matrix6 compliance = Matrix6::Zero();
-  // Vectors v of the sum of v vᵀ, two at a time: what is summed up is read and written half as
-  // often. Those of pure moments, of which the upper half is zero, on their own.
-  const auto add = [&](const double* vector, const double*& waiting, auto first_row) {
-    if (!waiting) {
-      waiting = vector;
+  // Two products at a time: what is summed up is read and written half as often. Those of pure
+  // moments, of which the upper half is zero, on their own.
+  struct Product {
+    const double *column = nullptr, *row = nullptr;
+  };
+  const auto add = [&](const Product& product, Product& waiting, auto first_row) {
+    if (!waiting.column) {
+      waiting = product;
       return;
     }
-    const Eigen::Map<const Vector6> a(waiting), b(vector);
-    waiting = nullptr;
+    const Eigen::Map<const Vector6> a(waiting.column), b(product.column);
+    const double *a_row = waiting.row, *b_row = product.row;
+    waiting = Product();
     unroll6([&](auto column) {
       constexpr int j = column, segment = 6 - j / 2 * 2;  // packets of two begin at even rows
       if constexpr (j >= first_row)
         compliance.col(j).template tail<segment>() +=
-            a[j] * a.template tail<segment>() + b[j] * b.template tail<segment>();
+            a_row[j] * a.template tail<segment>() + b_row[j] * b.template tail<segment>();
     });
   };
-  const double *force = nullptr, *moment = nullptr;
+  Product force, moment;
   const std::integral_constant<int, 0> of_force;
   const std::integral_constant<int, 3> of_moment;
   for (const std::size_t slot : active_) {
     Block& block = blocks_[slot];
     if (!block.state.loaded) continue;
     block.normal_wrench = normalWrench(block);
-    add(block.normal_wrench.data(), force, of_force);
+    block.normal_response = block.inverse_stiffness * block.normal_wrench;
+    add({block.normal_wrench.data(), block.normal_response.data()}, force, of_force);
+    const auto square = [&](int i) {
+      const double* column = block.e.col(i).data();
+      return Product{column, column};
+    };
     const int forces = block.has_pure_moments ? 3 : block.cone.size;
     for (int i = 0; i < forces; ++i)
-      if (block.is_free[i] != 0.) add(block.e.col(i).data(), force, of_force);
+      if (block.is_free[i] != 0.) add(square(i), force, of_force);
     for (int i = forces; i < block.cone.size; ++i)
-      if (block.is_free[i] != 0.) add(block.e.col(i).data(), moment, of_moment);
+      if (block.is_free[i] != 0.) add(square(i), moment, of_moment);
   }
   const Vector6 nothing = Vector6::Zero();
-  if (force) add(nothing.data(), force, of_force);
-  if (moment) add(nothing.data(), moment, of_moment);
+  if (force.column) add({nothing.data(), nothing.data()}, force, of_force);
+  if (moment.column) add({nothing.data(), nothing.data()}, moment, of_moment);
   compliance_ = compliance;
 }
 
 // Steps without ε, from the state at hand, until the wrench is reached. Returns false if it is not,
 // or if the state hardly gives some wrenches.
-bool DualNewton::stepFreely() {
+bool DualNewton::stepFreely(int steps) {
   rank_ = 6;
-  for (int step = 0; step < kFreeSteps && iterations_ < maximal_iterations_; ++step) {
+  for (int step = 0; step < steps && iterations_ < maximal_iterations_; ++step) {
     ++iterations_;
     assembleCompliance();
     factors_.compute(compliance_);
@@ -615,6 +645,7 @@ bool DualNewton::isFinite() const {
 DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const Vector6& target,
                                      const Vector6& wrench_weights, bool warm_start,
                                      int maximal_iterations) {
+  ++problem_;
   iterations_ = 0;
   maximal_iterations_ = maximal_iterations;
   if (!recognised_) return DistributionStatus::NumericalFailure;
@@ -631,20 +662,25 @@ DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const
     });
   }
 
-  const DistributionStatus status = search(warm_start && has_answer_);
-  has_answer_ = status != DistributionStatus::NumericalFailure;
+  const DistributionStatus status =
+      search(warm_start && last_status_ != DistributionStatus::NumericalFailure);
+  last_status_ = status;
   return status;
 }
 
 DistributionStatus DualNewton::search(bool from_last_answer) {
-  begin(from_last_answer);
-  bool reached = stepFreely();
-  if (!reached && from_last_answer && iterations_ == 1 && !hasFullRank()) {
-    // The last wrench was out of reach: if this one is, too, the state leads to the answer.
-    const DistributionStatus status = finish();
-    if (status != DistributionStatus::NumericalFailure) return status;
+  bool reached = false;
+  if (from_last_answer && begin(true)) {
+    reached = stepFreely(kFreeStepsFromLast);
+    if (!reached && last_status_ == DistributionStatus::Relaxed && iterations_ == 1) {
+      // If this wrench is out of reach, too, the state leads to the answer.
+      const DistributionStatus status = finish();
+      if (status != DistributionStatus::NumericalFailure) return status;
+    }
+  }
+  if (!reached) {
     begin(false);
-    reached = stepFreely();
+    reached = stepFreely(kFreeSteps);
   }
   if (reached) {
     missing_.setZero();

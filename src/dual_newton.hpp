@@ -129,10 +129,12 @@ class DualNewton {
     // The state with no component at its bound, but for those without extent; that at hand, and at
     // the last keepStates(); and the one that led to the last answer.
     State free, state, former, last;
+    std::size_t last_problem;  // that it took part in, when it did not any more
     // In this state, forces that respond to a pull are its projection on the free components, and
     // on the direction in which those at their bounds go with the normal force.
     Vector6 is_free, edge;
-    Vector6 normal_wrench;  // of a normal force, and what goes with it, of unit cost
+    double inverse_stiffness;                // 1 / ‖edge‖²
+    Vector6 normal_wrench, normal_response;  // e edge, and the same over the stiffness
     // Of the multipliers at hand: eᵀ ν, x(ν).
     Vector6 pull, force;
     // Of provesItself().
@@ -146,7 +148,7 @@ class DualNewton {
   static Vector6 pullOf(const Block& block, const Vector6& multipliers);
   static void addWrench(const Block& block, const Vector6& force, Vector6& wrench);
   static Vector6 normalWrench(const Block& block);
-  void begin(bool from_last_answer);
+  bool begin(bool from_last_answer);
   void keepStates();
   bool evaluate();
   void restart(const Vector6& multipliers);
@@ -156,7 +158,7 @@ class DualNewton {
   bool isReached(const Vector6& wrench, double enough) const;
   void refine(const Vector6& wrench, double enough);
   bool isFinite() const;
-  bool stepFreely();
+  bool stepFreely(int steps);
   bool stepWithSlack();
   DistributionStatus search(bool from_last_answer);
   void settle();
@@ -169,8 +171,8 @@ class DualNewton {
   std::vector<Block> blocks_;        // by slot
   std::vector<std::size_t> active_;  // slots
   bool recognised_ = false;          // whether all active cones are boxes
-  bool has_answer_ = false;          // whether the last solve() had one
-  double largest_weight_ = 0.;       // of the active contacts
+  DistributionStatus last_status_ = DistributionStatus::NumericalFailure;  // of the last solve()
+  double largest_weight_ = 0.;                                             // of the active contacts
   Vector6 weights_ = Vector6::Ones(), target_ = Vector6::Zero();
   Vector6 multipliers_ = Vector6::Zero(), achieved_ = Vector6::Zero();
   Vector6 missing_ = Vector6::Zero();  // of the closest wrench
@@ -181,6 +183,7 @@ class DualNewton {
   Matrix6 range_ = Matrix6::Zero();
   std::vector<Vector6> directions_;
   int iterations_ = 0, maximal_iterations_ = 0;
+  std::size_t problem_ = 0;  // counts solve()
 };
 
 }  // namespace dynacom::internal

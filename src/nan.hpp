@@ -9,8 +9,8 @@ namespace dynacom::internal {
 /// What is not known, or means nothing.
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// As Eigen's allFinite(), for long vectors in a fraction of the time: 0 times what is not finite is
-/// NaN, and so is the sum.
+/// As Eigen's allFinite(), for long vectors in a fraction of the time: 0 times what is not finite
+/// is NaN, and so is the sum.
 template <class Derived>
 bool areFinite(const Eigen::DenseBase<Derived>& numbers) {
   return (numbers.derived().array() * 0.).sum() == 0.;

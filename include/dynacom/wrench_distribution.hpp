@@ -150,7 +150,8 @@ class DYNACOM_EXPORT WrenchDistribution {
 
   /// Gets a slot's storage ready for a contact, so that a problem with it allocates nothing,
   /// whichever of the other slots take part.
-  /// @throws std::invalid_argument if the contact was never initialised
+  /// @param slot  at most the number of slots so far: that of the first new one
+  /// @throws std::invalid_argument if the contact was never initialised, or the slot is beyond
   void reserve(const ContactBase& contact, std::size_t slot);
 
   /// Forgets contacts, slots, and the answer; weights and settings stay.
@@ -165,7 +166,7 @@ class DYNACOM_EXPORT WrenchDistribution {
   ///         NotReadyError if it was never placed by updateNewtonEuler()
   void add(const ContactBase& contact);
 
-  /// The same in another slot, for contacts that are not always the same ones.
+  /// The same in another slot, as in reserve(), for contacts that are not always the same ones.
   void add(const ContactBase& contact, std::size_t slot);
 
   /// Adds a contact by its matrices, in the slot of its position.
