@@ -165,8 +165,9 @@ void exposeMotion() {
       (bp::arg("robot"), bp::arg("motion"), bp::arg("schedule"),
        bp::arg("flatHorizontalGround") = true, bp::arg("omega") = 0.,
        bp::arg("progress") = bp::object()),
-      "Computes dynamics and distribution for every frame of a motion. The robot, a DynaCoM,\n"
-      "is left as it is; contacts without schedule are never active.\n\n"
+      "Computes dynamics and distribution for every frame of a motion, whose contacts are placed\n"
+      "by the model: a pose that was measured once says nothing of them. The robot, a DynaCoM, is\n"
+      "left as it is; contacts without schedule are never active.\n\n"
       "flatHorizontalGround: as in DynaCoM.computeDynamics; omega: of the virtual repellent\n"
       "point [rad/s], 0 stands for sqrt(g / mean height of the centre of mass above the\n"
       "ground); progress: called now and then with the number of frames done. Raises ValueError\n"

@@ -192,8 +192,8 @@ void exposeWrenchDistribution() {
       .def("setWarmStart", &WrenchDistribution::setWarmStart,
            (bp::arg("self"), bp::arg("warmStart")),
            "Whether solve() starts from the inequalities that were active in each slot's last\n"
-           "answer, as is the default; else it starts with none. That changes how long it takes,\n"
-           "and answers by no more than rounding.")
+           "answer, if that was no more than ten problems ago, as is the default; else it starts\n"
+           "with none. That changes how long it takes, and answers by no more than rounding.")
       .def("getWarmStart", &WrenchDistribution::getWarmStart, bp::arg("self"),
            "Whether it does; True by default.")
       .def("setMaximalIterations", &WrenchDistribution::setMaximalIterations,

@@ -77,6 +77,7 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
   settings.validate();
 
   DynaCoM worker(robot);
+  for (const std::string& name : worker.getKnownContacts()) worker.resetContactPose(name);
   MotionAnalysis result;
   for (const std::string& name : schedule.names) worker.getContact(name);
   std::vector<std::shared_ptr<const ContactBase>> contacts;

@@ -75,11 +75,10 @@ struct MotionAnalysis {
   std::vector<Contact> contacts;  ///< all, as getKnownContacts() of the robot
 };
 
-/// Computes dynamics and distribution for every frame of a motion. The robot given is left as it
-/// is.
+/// Computes dynamics and distribution for every frame of a motion, whose contacts are placed by the
+/// model: a pose that was measured once says nothing of them. The robot given is left as it is.
 /// @throws std::invalid_argument if motion or schedule is not valid, or the schedule names a
-/// contact
-///         that the robot does not know; contacts without schedule are never active.
+///         contact that the robot does not know; contacts without schedule are never active.
 ///         NotReadyError before the robot's initialize()
 DYNACOM_EXPORT MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
                                             const ContactSchedule& schedule,

@@ -26,9 +26,8 @@ enum class DistributionStatus {
   /// A number that came in was not finite. The forces are those of the last Solved or Relaxed, if
   /// contacts and settings are still the same, else zero.
   InvalidInput,
-  /// The iterations were used up (WrenchDistribution::setMaximalIterations()), or the answer did
-  /// not
-  /// pass the check. The forces are as for InvalidInput.
+  /// The iterations were used up, see WrenchDistribution::setMaximalIterations(), or the answer did
+  /// not pass the check. The forces are as for InvalidInput.
   NumericalFailure,
 };
 
@@ -174,8 +173,7 @@ class DYNACOM_EXPORT WrenchDistribution {
   /// @param weights  wᵢ > 0 of the cost, n
   /// @param NE       takes λ to the wrench about the CoM, 6 × n
   /// @throws std::invalid_argument if the sizes do not fit, n is 0, A is not finite, a weight is
-  /// not
-  ///         finite and > 0, or the slot is taken
+  ///         not finite and > 0, or the slot is taken
   void add(const Eigen::Ref<const Eigen::MatrixXd>& A,
            const Eigen::Ref<const Eigen::VectorXd>& weights,
            const Eigen::Ref<const Eigen::Matrix<double, 6, Eigen::Dynamic>>& NE);
