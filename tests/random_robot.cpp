@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <pinocchio/algorithm/center-of-mass.hpp>
+#include <pinocchio/algorithm/centroidal.hpp>
 #include <pinocchio/algorithm/frames.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
@@ -172,6 +173,11 @@ void runForwardKinematics(const pinocchio::Model& model, pinocchio::Data& data, 
 void runFramesForwardKinematics(const pinocchio::Model& model, pinocchio::Data& data,
                                 const VectorXd& q) {
   pinocchio::framesForwardKinematics(model, data, q);
+}
+
+void runCentroidalDynamics(const pinocchio::Model& model, pinocchio::Data& data,
+                           const State& state) {
+  pinocchio::computeCentroidalMomentumTimeVariation(model, data, state.q, state.v, state.a);
 }
 
 }  // namespace dynacom_tests

@@ -58,4 +58,8 @@ void runForwardKinematics(const pinocchio::Model& model, pinocchio::Data& data, 
 void runFramesForwardKinematics(const pinocchio::Model& model, pinocchio::Data& data,
                                 const VectorXd& q);
 
+/// And computeCentroidalMomentumTimeVariation().
+void runCentroidalDynamics(const pinocchio::Model& model, pinocchio::Data& data,
+                           const State& state);
+
 }  // namespace dynacom_tests

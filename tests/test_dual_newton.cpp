@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #define BOOST_TEST_MODULE dual_newton
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
 #include <boost/test/unit_test.hpp>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -13,6 +18,7 @@ using namespace dynacom;
 using namespace dynacom_tests;
 using dynacom::internal::BoxCone;
 using dynacom::internal::DualNewton;
+using dynacom::internal::Factors6;
 using dynacom::internal::TwoStageSolver;
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -21,6 +27,8 @@ using Eigen::VectorXd;
 using Vector6 = DistributionResult::Vector6;
 
 namespace {
+
+constexpr int kEnough = WrenchDistribution::kMaximalIterations;
 
 MatrixXd inequalities(const ContactBase& contact) {
   MatrixXd A(contact.uni_rows() + contact.fri_rows(), contact.cols());
@@ -49,6 +57,36 @@ std::vector<DistributionResult::Contact> feet(Random& random) {
     contacts.back().relaxation_multipliers.setZero(contacts.back().A.rows());
   }
   return contacts;
+}
+
+/// A solver that knows these contacts, each in a slot, the last one in the first.
+DualNewton newtonOf(const std::vector<DistributionResult::Contact>& contacts) {
+  DualNewton newton;
+  newton.reserve(contacts.size() + 1);  // one more than are used
+  std::vector<std::size_t> slots;
+  for (const auto& contact : contacts) {
+    slots.push_back(contacts.size() - 1 - slots.size());
+    newton.setContact(slots.back(), contact);
+  }
+  newton.setActive(slots, contacts);
+  return newton;
+}
+
+/// A wrench of unit size for a robot that stands, is pushed, or is thrown about.
+Vector6 randomWrench(Random& random, const Vector6& weights) {
+  const Vector6 wrench = Vector6::Unit(2) + random.vector(6, random.coin() ? 0.1 : 1.);
+  return wrench / weights.cwiseProduct(wrench).norm();
+}
+
+/// A symmetric matrix with these eigenvalues, of which the upper half must not be read.
+Factors6::Matrix6 lowerHalf(Random& random, const Vector6& eigenvalues) {
+  const MatrixXd basis = MatrixXd::NullaryExpr(6, 6, [&] { return random.uniform(-1., 1.); })
+                             .householderQr()
+                             .householderQ();
+  Factors6::Matrix6 matrix = basis * eigenvalues.asDiagonal() * basis.transpose();
+  matrix.triangularView<Eigen::StrictlyUpper>().setConstant(
+      std::numeric_limits<double>::quiet_NaN());
+  return matrix;
 }
 
 }  // namespace
@@ -89,6 +127,93 @@ BOOST_AUTO_TEST_CASE(other_cones_are_not) {
   refused("no inequality", [](MatrixXd& other) { other = MatrixXd(0, 6); });
 }
 
+// --- Factors6 --------------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(factors_solve_as_accurately_as_those_of_eigen) {
+  Random random(94);
+  double worst = 0., worst_of_eigen = 0.;
+  for (const double decades : {0., 1., 3., 6., 8., 10.}) {
+    for (int trial = 0; trial < 200; ++trial) {
+      // Of all sizes, with a condition number of 10^decades.
+      Vector6 eigenvalues = Eigen::pow(10., random.vector(6, 0., decades).array());
+      eigenvalues[0] = 1.;
+      eigenvalues[5] = std::pow(10., decades);
+      eigenvalues *= std::pow(10., random.uniform(-20., 20.));
+      const Factors6::Matrix6 lower = lowerHalf(random, eigenvalues);
+      const Factors6::Matrix6 matrix = lower.selfadjointView<Eigen::Lower>();
+      const Vector6 rhs = random.vector(6);
+      Factors6 factors;
+      factors.compute(lower);
+      const Vector6 x = factors.solve(rhs);
+      const Eigen::LDLT<Factors6::Matrix6> eigen(matrix);
+      const Vector6 expected = eigen.solve(rhs);
+
+      // Both are the solution of a problem that differs by rounding.
+      const double size = eigenvalues[5] * expected.norm();
+      worst = std::max(worst, (matrix * x - rhs).norm() / size);
+      worst_of_eigen = std::max(worst_of_eigen, (matrix * expected - rhs).norm() / size);
+      const double rounding = 1e-14 * std::pow(10., decades);
+      BOOST_TEST((x - expected).norm() <= rounding * expected.norm());
+      // Without pivoting, D is the square of what stands on the diagonal of Cholesky's factor.
+      const Factors6::Matrix6 root = matrix.llt().matrixL();
+      const Vector6 pivots = root.diagonal().cwiseAbs2();
+      BOOST_TEST(((factors.pivots() - pivots).array().abs() <= rounding * pivots.array()).all());
+      BOOST_TEST((factors.pivots().array() > 0.).all());
+    }
+  }
+  BOOST_TEST(worst < 5e-15);
+  BOOST_TEST(worst < 5. * worst_of_eigen);
+}
+
+BOOST_AUTO_TEST_CASE(factors_by_hand) {
+  // L = [1 0; 3 1], D = (2, 5), and ones.
+  Factors6::Matrix6 matrix = Factors6::Matrix6::Identity();
+  matrix(0, 0) = 2.;
+  matrix(1, 0) = 6.;
+  matrix(1, 1) = 23.;
+  Factors6 factors;
+  factors.compute(matrix);
+  BOOST_TEST(factors.pivots() == (Vector6() << 2., 5., 1., 1., 1., 1.).finished());
+  // (2, 6; 6, 23) (1, 2) = (14, 52).
+  const Vector6 rhs = (Vector6() << 14., 52., 3., 4., 5., 6.).finished();
+  BOOST_TEST(close(factors.solve(rhs), (Vector6() << 1., 2., 3., 4., 5., 6.).finished(), 1e-14));
+  // And what was before does not matter.
+  factors.compute(Factors6::Matrix6::Identity());
+  BOOST_TEST(factors.pivots() == Vector6::Ones());
+  BOOST_TEST(factors.solve(rhs) == rhs);
+}
+
+BOOST_AUTO_TEST_CASE(a_matrix_that_is_not_positive_has_a_pivot_that_is_not) {
+  Random random(95);
+  Factors6 factors;
+  for (int trial = 0; trial < 500; ++trial) {
+    // As many pivots are negative as eigenvalues are, by Sylvester's law of inertia.
+    Vector6 eigenvalues = Eigen::pow(10., random.vector(6, -2., 2.).array());
+    const Index negative = random.integer(1, 6);
+    eigenvalues.head(negative) *= -1.;
+    factors.compute(lowerHalf(random, eigenvalues));
+    BOOST_TEST((factors.pivots().array() < 0.).count() == negative);
+
+    // Where an eigenvalue is zero, the last pivot is, but for rounding.
+    eigenvalues = eigenvalues.cwiseAbs();
+    eigenvalues[random.integer(0, 5)] = 0.;
+    factors.compute(lowerHalf(random, eigenvalues));
+    BOOST_TEST(factors.pivots().minCoeff() <= 1e-9 * factors.pivots().maxCoeff());
+  }
+  Factors6::Matrix6 matrix = Factors6::Matrix6::Zero();
+  factors.compute(matrix);
+  BOOST_TEST(!(factors.pivots().array() > 0.).any());
+  matrix.setIdentity();
+  matrix(3, 2) = 1.;  // a singular block
+  factors.compute(matrix);
+  BOOST_TEST(!(factors.pivots().array() > 0.).all());
+  matrix(5, 1) = std::numeric_limits<double>::quiet_NaN();
+  factors.compute(matrix);
+  BOOST_TEST(!(factors.pivots().array() > 0.).all());
+}
+
+// --- Answers ---------------------------------------------------------------------------------
+
 BOOST_AUTO_TEST_CASE(the_answer_is_that_of_the_other_solver) {
   Random random(91);
   int solved = 0, relaxed = 0, left = 0;
@@ -96,15 +221,12 @@ BOOST_AUTO_TEST_CASE(the_answer_is_that_of_the_other_solver) {
   for (int trial = 0; trial < trials; ++trial) {
     DistributionResult mine, other;
     mine.contacts = feet(random);
-    // Standing, pushed, thrown about.
-    Vector6 wrench = Vector6::Unit(2) + random.vector(6, random.coin() ? 0.1 : 1.);
-    Vector6 weights = random.coin() ? Vector6::Ones() : Vector6(random.vector(6, 0.5, 2.));
-    wrench /= weights.cwiseProduct(wrench).norm();
+    const Vector6 weights = random.coin() ? Vector6::Ones() : Vector6(random.vector(6, 0.5, 2.));
+    const Vector6 wrench = randomWrench(random, weights);
     other = mine;
 
-    DualNewton newton;
-    newton.setContacts(mine.contacts);
-    const DistributionStatus status = newton.solve(mine.contacts, wrench, weights);
+    DualNewton newton = newtonOf(mine.contacts);
+    const DistributionStatus status = newton.solve(mine.contacts, wrench, weights, true, kEnough);
     if (status == DistributionStatus::NumericalFailure) {
       ++left;
       continue;
@@ -113,7 +235,7 @@ BOOST_AUTO_TEST_CASE(the_answer_is_that_of_the_other_solver) {
     newton.writeAnswer(mine, 10., 1.);
     TwoStageSolver<long double> solver;
     solver.setProblem(other.contacts, weights);
-    BOOST_REQUIRE(solver.solve(wrench.cast<long double>()) == status);
+    BOOST_REQUIRE(solver.solve(wrench.cast<long double>(), kEnough) == status);
     solver.writeAnswer(other, 10., 1.);
     BOOST_TEST(close(mine.forces(), other.forces(), 1e-8));
 
@@ -138,11 +260,11 @@ BOOST_AUTO_TEST_CASE(no_wrench_wants_no_forces_whatever_was_before) {
   for (int trial = 0; trial < 50; ++trial) {
     DistributionResult result;
     result.contacts = feet(random);
-    DualNewton newton;
-    newton.setContacts(result.contacts);
+    DualNewton newton = newtonOf(result.contacts);
     for (const double size : {1., 0., 1e-15}) {
       const Vector6 wrench = size * Vector6::Unit(2);
-      const DistributionStatus status = newton.solve(result.contacts, wrench, Vector6::Ones());
+      const DistributionStatus status =
+          newton.solve(result.contacts, wrench, Vector6::Ones(), trial % 2 == 0, kEnough);
       if (status == DistributionStatus::NumericalFailure) continue;
       newton.writeAnswer(result, 1., 1.);
       Vector6 achieved = Vector6::Zero();
@@ -162,16 +284,155 @@ BOOST_AUTO_TEST_CASE(where_no_inequality_is_active_one_step_is_enough) {
     Vector6 wrench = Vector6::Zero();
     for (const auto& contact : result.contacts) wrench += contact.NE.col(2);
     wrench.normalize();
-    DualNewton newton;
-    newton.setContacts(result.contacts);
-    if (newton.solve(result.contacts, wrench, Vector6::Ones()) != DistributionStatus::Solved)
+    DualNewton newton = newtonOf(result.contacts);
+    if (newton.solve(result.contacts, wrench, Vector6::Ones(), false, kEnough) !=
+        DistributionStatus::Solved)
       continue;
     newton.writeAnswer(result, 1., 1.);
     int active = 0;
     for (const auto& contact : result.contacts) active += static_cast<int>(contact.active.count());
     if (active > 0) continue;
     ++inside;
-    BOOST_TEST(newton.iterations() == 1);
+    // One or two points cannot give all wrenches: it may take a step to find out.
+    Index components = 0;
+    for (const auto& contact : result.contacts) components += contact.A.cols();
+    const bool few = components == 3 || (components == 6 && result.contacts.size() == 2);
+    BOOST_TEST(newton.iterations() <= (few ? 2 : 1));
   }
   BOOST_TEST(inside > 50);
+}
+
+BOOST_AUTO_TEST_CASE(from_the_state_of_an_answer_one_step_leads_to_it_again) {
+  Random random(96);
+  int answers = 0, others = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    DistributionResult first;
+    first.contacts = feet(random);
+    const Vector6 weights = random.coin() ? Vector6::Ones() : Vector6(random.vector(6, 0.5, 2.));
+    const Vector6 wrench = randomWrench(random, weights);
+    DualNewton newton = newtonOf(first.contacts);
+    const DistributionStatus status = newton.solve(first.contacts, wrench, weights, true, kEnough);
+    if (status == DistributionStatus::NumericalFailure) continue;
+    ++answers;
+    const int iterations = newton.iterations();
+    newton.writeAnswer(first, 1., 1.);
+    DistributionResult again = first;
+    BOOST_TEST(newton.solve(again.contacts, wrench, weights, true, kEnough) == status);
+    newton.writeAnswer(again, 1., 1.);
+    BOOST_TEST(newton.iterations() == 1);
+    BOOST_TEST(close(again.forces(), first.forces(), 1e-10));
+    // A larger wrench of the same kind wants the same state.
+    BOOST_TEST(newton.solve(again.contacts, 1.3 * wrench, weights, true, kEnough) == status);
+    BOOST_TEST(newton.iterations() == 1);
+    // Without, it is as if nothing had been before: the same bits.
+    BOOST_TEST(newton.solve(again.contacts, wrench, weights, false, kEnough) == status);
+    newton.writeAnswer(again, 1., 1.);
+    BOOST_TEST(newton.iterations() == iterations);
+    BOOST_TEST(again.forces() == first.forces());
+    if (iterations > 1) ++others;
+  }
+  BOOST_TEST(answers > 900);
+  BOOST_TEST(others > 300);
+}
+
+BOOST_AUTO_TEST_CASE(a_state_stays_with_its_slot) {
+  Random random(97);
+  int answers = 0, returns = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    DistributionResult result;
+    result.contacts = feet(random);
+    const Vector6 weights = Vector6::Ones(), wrench = randomWrench(random, weights);
+    DualNewton newton = newtonOf(result.contacts);
+    const auto solve = [&](const Vector6& wrench) {
+      return newton.solve(result.contacts, wrench, weights, true, kEnough);
+    };
+    const DistributionStatus status = solve(wrench);
+    if (status == DistributionStatus::NumericalFailure) continue;
+    ++answers;
+    // The contacts in another order, which is that of their slots.
+    std::vector<std::size_t> slots;
+    for (std::size_t slot = 0; slot < result.contacts.size(); ++slot) slots.push_back(slot);
+    std::reverse(result.contacts.begin(), result.contacts.end());
+    newton.setActive(slots, result.contacts);
+    BOOST_TEST(solve(wrench) == status);
+    BOOST_TEST(newton.iterations() == 1);
+    newton.writeAnswer(result, 1., 1.);
+    const DistributionResult all = result;
+
+    // For a while the last one takes no part, while the others give what they have given.
+    if (slots.size() > 1 && status == DistributionStatus::Solved) {
+      const auto& last = all.contacts.back();
+      slots.pop_back();
+      result.contacts.pop_back();
+      newton.setActive(slots, result.contacts);
+      if (solve(wrench - last.NE * last.force) == DistributionStatus::Solved &&
+          newton.iterations() == 1) {
+        slots.push_back(slots.size());
+        result.contacts = all.contacts;
+        newton.setActive(slots, result.contacts);
+        BOOST_TEST(solve(wrench) == status);
+        BOOST_TEST(newton.iterations() == 1);
+        ++returns;
+      }
+    }
+
+    // A contact that is set again is a new one: nothing is known of it but what it is.
+    result = all;
+    slots.clear();
+    for (const auto& contact : all.contacts) {
+      slots.push_back(slots.size());
+      newton.setContact(slots.back(), contact);
+    }
+    newton.setActive(slots, all.contacts);
+    BOOST_TEST(solve(wrench) == status);
+    newton.writeAnswer(result, 1., 1.);
+    BOOST_TEST(close(result.forces(), all.forces(), 1e-10));
+  }
+  BOOST_TEST(answers > 900);
+  BOOST_TEST(returns > 100);
+}
+
+BOOST_AUTO_TEST_CASE(no_more_iterations_are_taken_than_are_allowed) {
+  Random random(98);
+  int given_up = 0, answered = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    DistributionResult result, limited;
+    result.contacts = feet(random);
+    limited = result;
+    const Vector6 weights = Vector6::Ones(), wrench = randomWrench(random, weights);
+    DualNewton newton = newtonOf(result.contacts);
+    TwoStageSolver<double> solver;
+    solver.setProblem(result.contacts, weights);
+    const DistributionStatus status =
+        newton.solve(result.contacts, wrench, weights, false, kEnough);
+    const int iterations = newton.iterations();
+    newton.writeAnswer(result, 1., 1.);
+    const DistributionStatus robust_status = solver.solve(wrench, kEnough);
+    const int robust_iterations = solver.iterations();
+    BOOST_TEST(robust_iterations > 0);
+    for (int limit = 1; limit <= 40; ++limit) {
+      const DistributionStatus by_newton =
+          newton.solve(limited.contacts, wrench, weights, false, limit);
+      BOOST_TEST(newton.iterations() <= limit);
+      if (by_newton != DistributionStatus::NumericalFailure) {
+        ++answered;
+        BOOST_TEST(by_newton == status);
+        newton.writeAnswer(limited, 1., 1.);
+        BOOST_TEST(close(limited.forces(), result.forces(), 1e-9));
+      }
+      if (limit >= iterations) BOOST_TEST(by_newton == status);
+      const DistributionStatus by_robust = solver.solve(wrench, limit);
+      BOOST_TEST(solver.iterations() <= limit);
+      if (limit >= robust_iterations)
+        BOOST_TEST(by_robust == robust_status);
+      else if (by_robust != DistributionStatus::NumericalFailure)
+        BOOST_TEST(by_robust == robust_status);
+      else
+        ++given_up;
+    }
+    BOOST_TEST(solver.solve(wrench, 0) == DistributionStatus::NumericalFailure);
+    BOOST_TEST(solver.iterations() == 0);
+  }
+  BOOST_TEST(answered > 1000);
+  BOOST_TEST(given_up > 1000);
 }

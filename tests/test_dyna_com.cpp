@@ -237,6 +237,197 @@ BOOST_AUTO_TEST_CASE(ground_wrench_is_that_of_recursive_newton_euler) {
   }
 }
 
+namespace {
+
+/// Data on which the algorithm has run that computeDynamics(data) wants.
+pinocchio::Data knownMotion(const pinocchio::Model& model, const State& x) {
+  pinocchio::Data data(model);
+  runCentroidalDynamics(model, data, x);
+  return data;
+}
+
+/// All that two DynaCoM compute of a motion, relative to each number's size.
+void checkSameMotion(const DynaCoM& one, const DynaCoM& other) {
+  BOOST_TEST(close(groundWrench(one), groundWrench(other)));
+  BOOST_TEST(close(one.getCoM(), other.getCoM()));
+  BOOST_TEST(close(one.getVCoM(), other.getVCoM()));
+  BOOST_TEST(close(one.getACoM(), other.getACoM()));
+  BOOST_TEST(close(one.getAM(), other.getAM()));
+  BOOST_TEST(close(one.getAMVariation(), other.getAMVariation()));
+  BOOST_TEST(one.isCoPDefined() == other.isCoPDefined());
+  if (one.isCoPDefined()) BOOST_TEST(close(one.getCoP(), other.getCoP()));
+  if (!allNaN(other.getVRP())) BOOST_TEST(close(one.getVRP(), other.getVRP()));
+  if (!allNaN(other.getNL())) BOOST_TEST(close(one.getNL(), other.getNL()));
+  if (!allNaN(other.getFeasibleACoM()))
+    BOOST_TEST(close(feasibleAccelerations(one), feasibleAccelerations(other)));
+  BOOST_TEST(one.getDistributionStatus() == other.getDistributionStatus());
+  BOOST_TEST(close(one.allForces(), other.allForces()));
+  BOOST_TEST(close(one.ne_A(), other.ne_A()));
+  for (const auto& name : other.getKnownContacts())
+    BOOST_TEST(close(one.getContact(name)->getPose().toHomogeneousMatrix(),
+                     other.getContact(name)->getPose().toHomogeneousMatrix()));
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(a_motion_that_is_known_gives_the_same_results) {
+  int solved = 0, relaxed = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    Biped computed(100 + seed), known(100 + seed);
+    computed.dynacom.addContact(makePoint("sole0"), "idle", false);
+    known.dynacom.addContact(makePoint("sole0"), "idle", false);
+    for (int trial = 0; trial < 4; ++trial) {
+      const State x = computed.moving();
+      const Vector6 external = computed.random.vector(6, trial % 2 == 0 ? 2. : 300.);
+      const bool flat = trial == 0;
+      compute(computed.dynacom, x, external, flat);
+      computed.dynacom.computeNL(3.);
+      known.dynacom.computeDynamics(knownMotion(known.model, x), external, flat);
+      known.dynacom.computeNL(3.);
+      checkSameMotion(known.dynacom, computed.dynacom);
+      if (flat) continue;
+      const auto status = known.dynacom.getDistributionStatus();
+      (status == DistributionStatus::Solved ? solved : relaxed) += 1;
+    }
+    // Without what is not said: no external wrench, on flat ground.
+    const State x = computed.moving();
+    computed.dynacom.computeDynamics(x.q, x.v, x.a);
+    known.dynacom.computeDynamics(knownMotion(known.model, x));
+    checkSameMotion(known.dynacom, computed.dynacom);
+  }
+  BOOST_TEST(solved > 10);
+  BOOST_TEST(relaxed > 10);
+  // Robots of every kind.
+  Random random(101);
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    const auto model = randomHumanoid(seed);
+    const State x = randomState(model, random);
+    DynaCoM computed(model), known(model);
+    compute(computed, x);
+    known.computeDynamics(knownMotion(model, x));
+    checkSameMotion(known, computed);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_motion_that_is_known_is_copied) {
+  Biped computed(102), known(102);
+  const State x = computed.moving();
+  compute(computed.dynacom, x);
+  {
+    pinocchio::Data data = knownMotion(known.model, x);
+    known.dynacom.computeDynamics(data);
+    const View before = everythingSeen(known.dynacom);
+    // It becomes that of another motion, and is gone then.
+    runCentroidalDynamics(known.model, data, known.moving());
+    for (auto& placement : data.oMi) placement.translation().setConstant(kNaN);
+    data.com[0].setConstant(kNaN);
+    BOOST_TEST(same(everythingSeen(known.dynacom), before));
+  }
+  // Contacts are placed by it all the same.
+  for (Biped* biped : {&computed, &known}) {
+    biped->dynacom.deactivateContact("left");
+    biped->dynacom.activateContact("left");
+    biped->dynacom.addContact(makePoint("sole1"), "late");
+    biped->dynacom.computeNL(3.);
+    distribute(biped->dynacom);
+  }
+  checkSameMotion(known.dynacom, computed.dynacom);
+  for (pinocchio::JointIndex joint = 0; joint < known.dynacom.getData().oMi.size(); ++joint)
+    BOOST_TEST(close(known.dynacom.getData().oMi[joint].toHomogeneousMatrix(),
+                     computed.dynacom.getData().oMi[joint].toHomogeneousMatrix()));
+  // It may be the data of the DynaCoM itself.
+  const State y = computed.moving();
+  runCentroidalDynamics(known.dynacom.getModel(), known.dynacom.getData(), y);
+  known.dynacom.computeDynamics(known.dynacom.getData(), Vector6::Zero(), false);
+  compute(computed.dynacom, y, Vector6::Zero(), false);
+  known.dynacom.computeNL(3.);
+  computed.dynacom.computeNL(3.);
+  checkSameMotion(known.dynacom, computed.dynacom);
+}
+
+BOOST_AUTO_TEST_CASE(a_motion_that_is_not_finite_is_not_known) {
+  for (const bool flat : {true, false}) {
+    for (int i = 0; i < 3; ++i) {
+      Biped biped(103);
+      compute(biped.dynacom, restState(biped.model), Vector6::Zero(), false);
+      const VectorXd forces = biped.dynacom.allForces();
+      State x = restState(biped.model);
+      (i == 0 ? x.q : i == 1 ? x.v : x.a)[2] = kNaN;
+      biped.dynacom.computeDynamics(knownMotion(biped.model, x), Vector6::Zero(), flat);
+      BOOST_TEST(motionIsUnknown(biped.dynacom));
+      BOOST_TEST(close(biped.dynacom.allForces(), forces, 0.));
+      BOOST_TEST(biped.dynacom.getDistributionStatus() ==
+                 (flat ? DistributionStatus::Solved : DistributionStatus::InvalidInput));
+    }
+    Biped biped(103);
+    biped.dynacom.computeDynamics(knownMotion(biped.model, biped.moving()),
+                                  Vector6::Constant(kInfinity), flat);
+    BOOST_TEST(motionIsUnknown(biped.dynacom));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(data_of_no_motion_are_refused_and_change_nothing) {
+  Biped biped(104);
+  DynaCoM& dynacom = biped.dynacom;
+  const State x = biped.moving();
+  dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
+  const auto check = [&](const auto& refused) {
+    for (const bool flat : {true, false}) {
+      const View before = everythingSeen(dynacom);
+      const auto placements = dynacom.getData().oMi;
+      refused(flat);
+      BOOST_TEST(same(everythingSeen(dynacom), before));
+      for (std::size_t i = 0; i < placements.size(); ++i)
+        BOOST_TEST((dynacom.getData().oMi[i] == placements[i]));
+    }
+  };
+  const std::string joints = std::to_string(biped.model.njoints);
+  // Another robot's.
+  const auto other = singleBody(10., {});
+  const auto wrong_size = [&](const pinocchio::Data& data, const std::string& size) {
+    check([&](bool flat) {
+      BOOST_TEST(throws<std::invalid_argument>(
+          [&] { dynacom.computeDynamics(data, Vector6::Zero(), flat); }, {"oMi", joints, size}));
+    });
+  };
+  wrong_size(knownMotion(other, restState(other)), "2");
+  wrong_size(pinocchio::Data(), "0");
+  const auto not_ready = [&](const pinocchio::Data& data) {
+    check([&](bool flat) {
+      BOOST_TEST(
+          throws<NotReadyError>([&] { dynacom.computeDynamics(data, Vector6::Zero(), flat); },
+                                {"computeCentroidalMomentumTimeVariation", "mass"}));
+    });
+  };
+  // Those of a robot as large, but heavier; those of none; those of a posture.
+  auto heavy = biped.model;
+  heavy.inertias[1].mass() *= 1.01;
+  not_ready(knownMotion(heavy, x));
+  not_ready(pinocchio::Data(biped.model));
+  pinocchio::Data posture(biped.model);
+  runForwardKinematics(biped.model, posture, x.q);
+  not_ready(posture);
+  auto unknown = knownMotion(biped.model, x);
+  unknown.mass[0] = kNaN;
+  not_ready(unknown);
+
+  // A contact that cannot be placed is found out before anything changes.
+  auto settings = biped.right->getSettings();
+  settings.frame_name = "nowhere";
+  biped.right->initialize(settings);
+  const auto data = knownMotion(biped.model, biped.moving());
+  check([&](bool flat) {
+    BOOST_TEST(throws<std::invalid_argument>(
+        [&] { dynacom.computeDynamics(data, Vector6::Zero(), flat); }, {"nowhere"}));
+  });
+  settings.frame_name = "sole1";
+  biped.right->initialize(settings);
+  dynacom.computeDynamics(data);
+  BOOST_TEST(close(dynacom.getCoM(), Vector3d(data.com[0]), 0.));
+
+  BOOST_TEST(throws<NotReadyError>([&] { DynaCoM().computeDynamics(data); }, {"initialize"}));
+}
+
 BOOST_AUTO_TEST_CASE(at_rest_the_ground_carries_the_weight_below_the_com) {
   Biped biped(3);
   State x = biped.moving();
@@ -1469,6 +1660,388 @@ BOOST_AUTO_TEST_CASE(forces_balance_about_the_com_that_is_given) {
   Vector6 expected;
   expected << wrench.head<3>(), com.cross(Vector3d(wrench.head<3>()));
   BOOST_TEST(close(atOrigin, expected, 1e-9));
+}
+
+// --- Measured placements -------------------------------------------------------------------------
+
+namespace {
+
+boost::test_tools::predicate_result samePose(const SE3& one, const SE3& other,
+                                             double tolerance = 0.) {
+  return close(one.toHomogeneousMatrix(), other.toHomogeneousMatrix(), tolerance);
+}
+
+/// Where a biped's right sole might be measured: a little higher than expected, and tilted.
+SE3 measuredPose(const Biped& biped, const State& x) {
+  SE3 pose = framePlacement(biped.model, x.q, "sole1");
+  pose.translation() += Vector3d(0.02, -0.03, 0.05);
+  pose.rotation() = Eigen::AngleAxisd(0.1, Vector3d::UnitX()).toRotationMatrix() * pose.rotation();
+  return pose;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(a_contact_is_where_it_was_measured) {
+  for (const bool flat : {true, false}) {
+    Biped biped(105);
+    DynaCoM& dynacom = biped.dynacom;
+    State x = restState(biped.model);
+    compute(dynacom, x);
+    const SE3 pose = measuredPose(biped, x);
+    dynacom.setContactPose("right", pose);
+    BOOST_TEST(samePose(biped.right->getPose(), pose));
+    // Its matrix is that of the new place at once.
+    SE3 from_com = pose;
+    from_com.translation() -= dynacom.getCoM();
+    BOOST_TEST(close(biped.right->ne_A(), from_com.toDualActionMatrix()));
+    const auto check = [&] {
+      BOOST_TEST(samePose(biped.right->getPose(), pose));
+      BOOST_TEST(samePose(biped.left->getPose(), framePlacement(biped.model, x.q, "sole0"), 1e-12));
+    };
+    // Forces give the wrench from there, about the CoM.
+    BOOST_TEST(distribute(dynacom) == DistributionStatus::Solved);
+    BOOST_TEST(close(givenWrench(dynacom, x.q), groundWrench(dynacom), 1e-9));
+    Vector3d moment = Vector3d::Zero();
+    for (const auto& [contact, place] :
+         {std::pair(biped.left, biped.left->getPose()), std::pair(biped.right, pose)}) {
+      const Vector3d force = place.rotation() * contact->appliedForce().head<3>();
+      moment += (place.translation() - dynacom.getCoM()).cross(force) +
+                place.rotation() * contact->appliedForce().tail<3>();
+    }
+    BOOST_TEST(close(moment, dynacom.getGroundCoMTorque(), 1e-9));
+    check();
+
+    // The robot moves on, and the contact stays, whatever is computed.
+    for (int trial = 0; trial < 5; ++trial) {
+      x = biped.moving();
+      compute(dynacom, x, Vector6::Zero(), flat);
+      check();
+      dynacom.computeDynamics(knownMotion(biped.model, x), Vector6::Zero(), flat);
+      check();
+      distribute(dynacom);
+      check();
+      BOOST_TEST(close(givenWrench(dynacom, x.q), dynacom.getDistribution().achieved, 1e-9));
+      dynacom.deactivateContact("right");
+      compute(dynacom, x, Vector6::Zero(), flat);
+      check();
+      dynacom.activateContact("right");
+      check();
+      dynacom.addContact(makePoint("sole1"), "point", false);
+      dynacom.removeContact("point");
+      check();
+      // That a contact is given other settings does not move it.
+      biped.right->initialize(biped.right->getSettings());
+      distribute(dynacom);
+      check();
+    }
+    // About the CoM of the motion, once there is one.
+    from_com = pose;
+    from_com.translation() -= dynacom.getCoM();
+    BOOST_TEST(close(biped.right->ne_A(), from_com.toDualActionMatrix()));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_measured_placement_changes_no_more_than_the_contact) {
+  Biped biped(106);
+  const State x = biped.moving();
+  compute(biped.dynacom, x, Vector6::Zero(), false);
+  const View before = everythingSeen(biped.dynacom);
+  const SE3 model_pose = biped.right->getPose();
+  biped.dynacom.setContactPose("right", measuredPose(biped, x));
+  View after = everythingSeen(biped.dynacom);
+  for (const std::string what : {"pose of right", "ne_A"}) {
+    BOOST_TEST(before.at(what) != after.at(what));
+    after[what] = before.at(what);
+  }
+  BOOST_TEST(same(after, before));
+  // Where the model says, it is as if nothing had been measured.
+  biped.dynacom.setContactPose("right", model_pose);
+  BOOST_TEST(same(everythingSeen(biped.dynacom), before));
+}
+
+BOOST_AUTO_TEST_CASE(a_contact_goes_back_to_where_the_model_says) {
+  Biped biped(107);
+  DynaCoM& dynacom = biped.dynacom;
+  const State x = biped.moving(), y = biped.moving();
+  const SE3 pose = measuredPose(biped, x);
+  const auto byModel = [&](const State& state) {
+    return framePlacement(biped.model, state.q, "sole1");
+  };
+  compute(dynacom, x);
+  dynacom.setContactPose("right", pose);
+  compute(dynacom, y);
+  // From the next computeDynamics() on, of either kind.
+  dynacom.resetContactPose("right");
+  BOOST_TEST(samePose(biped.right->getPose(), pose));
+  compute(dynacom, x);
+  BOOST_TEST(samePose(biped.right->getPose(), byModel(x), 1e-12));
+  dynacom.setContactPose("right", pose);
+  dynacom.resetContactPose("right");
+  dynacom.computeDynamics(knownMotion(biped.model, y));
+  BOOST_TEST(samePose(biped.right->getPose(), byModel(y), 1e-12));
+  // Or distributeForce().
+  dynacom.setContactPose("right", pose);
+  distribute(dynacom);
+  BOOST_TEST(samePose(biped.right->getPose(), pose));
+  dynacom.resetContactPose("right");
+  distribute(dynacom);
+  BOOST_TEST(samePose(biped.right->getPose(), byModel(y), 1e-12));
+  BOOST_TEST(close(givenWrench(dynacom, y.q), dynacom.getDistribution().achieved, 1e-9));
+  // What was never set can be reset, and what was set can be set again.
+  const View before = everythingSeen(dynacom);
+  dynacom.resetContactPose("left");
+  dynacom.resetContactPose("right");
+  BOOST_TEST(same(everythingSeen(dynacom), before));
+  dynacom.setContactPose("right", pose);
+  dynacom.setContactPose("right", SE3::Identity());
+  compute(dynacom, x);
+  BOOST_TEST(samePose(biped.right->getPose(), SE3::Identity()));
+  // A contact that is removed and comes back was never measured.
+  dynacom.removeContact("right");
+  dynacom.addContact(biped.right, "right");
+  BOOST_TEST(samePose(biped.right->getPose(), byModel(x), 1e-12));
+}
+
+BOOST_AUTO_TEST_CASE(a_contact_may_be_measured_before_anything_is_computed) {
+  Biped biped(108);
+  const State x = restState(biped.model);
+  const SE3 pose = measuredPose(biped, x);
+  biped.dynacom.deactivateContact("right");
+  biped.dynacom.setContactPose("right", pose);
+  BOOST_TEST(samePose(biped.right->getPose(), pose));
+  biped.dynacom.activateContact("right");
+  compute(biped.dynacom, x);
+  BOOST_TEST(samePose(biped.right->getPose(), pose));
+  BOOST_TEST(distribute(biped.dynacom) == DistributionStatus::Solved);
+  BOOST_TEST(close(givenWrench(biped.dynacom, x.q), groundWrench(biped.dynacom), 1e-9));
+
+  // Where all contacts are measured, no kinematics are needed.
+  Biped blind(108);
+  const SE3 left = framePlacement(biped.model, x.q, "sole0");
+  blind.dynacom.setContactPose("left", left);
+  blind.dynacom.setContactPose("right", pose);
+  BOOST_TEST(distribute(blind.dynacom, groundWrench(biped.dynacom), biped.dynacom.getCoM()) ==
+             DistributionStatus::Solved);
+  BOOST_TEST(close(blind.left->appliedForce(), biped.left->appliedForce(), 1e-8));
+  BOOST_TEST(close(blind.right->appliedForce(), biped.right->appliedForce(), 1e-8));
+}
+
+BOOST_AUTO_TEST_CASE(a_point_is_measured_by_its_frame) {
+  // Its surface is where the settings say, as when the model places it.
+  const auto model = singleBody(10., stance(2));
+  DynaCoM dynacom(model);
+  ContactPointSettings settings = makePoint("sole0")->getSettings();
+  settings.radius = 0.02;
+  settings.world_aligned = true;
+  const auto point = std::make_shared<ContactPoint>(settings);
+  dynacom.addContact(point, "point");
+  compute(dynacom, restState(model));
+  const SE3 pose = Random(109).placement();
+  dynacom.setContactPose("point", pose);
+  compute(dynacom, restState(model));
+  BOOST_TEST(samePose(point->getPose(), pose));
+  BOOST_TEST(close(point->getSurfacePose().translation(),
+                   Vector3d(pose.translation() - 0.02 * Vector3d::UnitZ())));
+}
+
+BOOST_AUTO_TEST_CASE(copies_keep_measured_placements) {
+  Biped biped(110);
+  const State x = biped.moving(), y = biped.moving();
+  compute(biped.dynacom, x);
+  const SE3 pose = measuredPose(biped, x);
+  biped.dynacom.setContactPose("right", pose);
+  DynaCoM assigned;
+  assigned = biped.dynacom;
+  DynaCoM moved = DynaCoM(biped.dynacom);
+  for (DynaCoM* copy : {&assigned, &moved}) {
+    compute(*copy, y);
+    BOOST_TEST(samePose(copy->getContact("right")->getPose(), pose));
+    BOOST_TEST(samePose(copy->getContact("left")->getPose(),
+                        framePlacement(biped.model, y.q, "sole0"), 1e-12));
+    // Each on its own.
+    copy->resetContactPose("right");
+    copy->setContactPose("left", pose);
+    compute(*copy, y);
+    BOOST_TEST(samePose(copy->getContact("right")->getPose(),
+                        framePlacement(biped.model, y.q, "sole1"), 1e-12));
+    compute(biped.dynacom, y);
+    BOOST_TEST(samePose(biped.right->getPose(), pose));
+    BOOST_TEST(samePose(biped.left->getPose(), framePlacement(biped.model, y.q, "sole0"), 1e-12));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_measurement_that_fails_is_a_status) {
+  Biped biped(111);
+  DynaCoM& dynacom = biped.dynacom;
+  const State x = restState(biped.model);
+  compute(dynacom, x);
+  const SE3 pose = measuredPose(biped, x);
+  dynacom.setContactPose("right", pose);
+  BOOST_REQUIRE(distribute(dynacom) == DistributionStatus::Solved);
+  const VectorXd forces = dynacom.allForces();
+  for (const double bad : {kNaN, kInfinity}) {
+    SE3 wrong = pose;
+    wrong.translation()[1] = bad;
+    dynacom.setContactPose("right", wrong);
+    BOOST_TEST(distribute(dynacom) == DistributionStatus::InvalidInput);
+    BOOST_TEST(close(dynacom.allForces(), forces, 0.));
+    compute(dynacom, x, Vector6::Zero(), false);
+    BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::InvalidInput);
+    BOOST_TEST(close(dynacom.allForces(), forces, 0.));
+    dynacom.setContactPose("right", pose);
+    BOOST_TEST(distribute(dynacom) == DistributionStatus::Solved);
+    BOOST_TEST(close(dynacom.allForces(), forces, 1e-9));
+  }
+  for (const std::string name : {"tail", ""}) {
+    const View before = everythingSeen(dynacom);
+    BOOST_TEST(throws<std::invalid_argument>([&] { dynacom.setContactPose(name, pose); },
+                                             {name.empty() ? "left" : name, "left", "right"}));
+    BOOST_TEST(throws<std::invalid_argument>([&] { dynacom.resetContactPose(name); },
+                                             {name.empty() ? "left" : name, "left", "right"}));
+    BOOST_TEST(same(everythingSeen(dynacom), before));
+  }
+  BOOST_TEST(throws<std::invalid_argument>(
+      [&] { DynaCoM().setContactPose("left", SE3::Identity()); }, {"left", "none"}));
+}
+
+// --- Warm start ----------------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(how_distributions_iterate_is_a_setting) {
+  Biped biped(112);
+  DynaCoM& dynacom = biped.dynacom;
+  BOOST_TEST(dynacom.getWarmStart());
+  BOOST_TEST(dynacom.getMaximalIterations() == +WrenchDistribution::kMaximalIterations);
+  dynacom.setWarmStart(false);
+  dynacom.setMaximalIterations(1);
+  for (const int bad : {0, -3}) {
+    const View before = everythingSeen(dynacom);
+    BOOST_TEST(throws<std::invalid_argument>([&] { dynacom.setMaximalIterations(bad); },
+                                             {"maximalIterations", "> 0", std::to_string(bad)}));
+    BOOST_TEST(same(everythingSeen(dynacom), before));
+  }
+  const DynaCoM copy = dynacom;
+  BOOST_TEST(!copy.getWarmStart());
+  BOOST_TEST(copy.getMaximalIterations() == 1);
+
+  // At rest one iteration is enough, beyond friction it is not.
+  compute(dynacom, restState(biped.model), Vector6::Zero(), false);
+  BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::Solved);
+  const VectorXd forces = dynacom.allForces();
+  Vector6 external = Vector6::Zero();
+  external.head<2>() << -900., -300.;
+  compute(dynacom, restState(biped.model), external, false);
+  BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::NumericalFailure);
+  BOOST_TEST(dynacom.getDistribution().iterations == 1);
+  BOOST_TEST(close(dynacom.allForces(), forces, 0.));
+  dynacom.setMaximalIterations(WrenchDistribution::kMaximalIterations);
+  compute(dynacom, restState(biped.model), external, false);
+  BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::Relaxed);
+
+  // They stay when another robot comes.
+  dynacom.setMaximalIterations(7);
+  dynacom.initialize(biped.model);
+  BOOST_TEST(!dynacom.getWarmStart());
+  BOOST_TEST(dynacom.getMaximalIterations() == 7);
+}
+
+BOOST_AUTO_TEST_CASE(warm_start_never_changes_what_a_robot_does) {
+  // It walks and is pushed, and its contacts come and go.
+  long warm_iterations = 0, cold_iterations = 0;
+  int solved = 0, relaxed = 0;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    Random random(120 + seed);
+    const auto model = standingRobot(random, stance(4));
+    DynaCoM warm(model);
+    Names names;
+    for (int i = 0; i < 4; ++i) {
+      const std::string frame = "sole" + std::to_string(i);
+      names.push_back(frame);
+      if (i < 2)
+        warm.addContact(makeSole(frame), frame);
+      else
+        warm.addContact(makePoint(frame), frame, false);
+    }
+    DynaCoM cold = warm;
+    cold.setWarmStart(false);
+    State x = restState(model);
+    Vector6 external = Vector6::Zero();
+    for (int tick = 0; tick < 200; ++tick) {
+      // A little further; now and then, a push.
+      x.q = moved(model, x.q, random.vector(model.nv, 1e-4));
+      external += Vector6(random.vector(6, 0.5));
+      if (random.integer(0, 39) == 0) external = random.vector(6, random.coin() ? 20. : 400.);
+      const std::string name = names[static_cast<std::size_t>(random.integer(0, 3))];
+      const auto active = asSet(warm.getActiveContacts());
+      if (random.integer(0, 9) == 0) {
+        for (DynaCoM* dynacom : {&warm, &cold}) {
+          if (active.count(name) == 0)
+            dynacom->activateContact(name);
+          else if (active.size() > 1)
+            dynacom->deactivateContact(name);
+        }
+      }
+      compute(warm, x, external, false);
+      compute(cold, x, external, false);
+      const DistributionResult &result = warm.getDistribution(), &expected = cold.getDistribution();
+      BOOST_TEST(result.status == expected.status);
+      BOOST_TEST(result.isOptimal());
+      BOOST_TEST(expected.isOptimal());
+      const double scale = result.scale;
+      BOOST_TEST(close(result.forces() / scale, expected.forces() / scale, 1e-9));
+      BOOST_TEST(close(result.achieved / scale, expected.achieved / scale, 1e-9));
+      BOOST_TEST(close(result.cost / (scale * scale), expected.cost / (scale * scale), 1e-9));
+      warm_iterations += result.iterations;
+      cold_iterations += expected.iterations;
+      (result.status == DistributionStatus::Solved ? solved : relaxed) += 1;
+    }
+  }
+  BOOST_TEST(solved > 200);
+  BOOST_TEST(relaxed > 200);
+  BOOST_TEST(warm_iterations < 0.6 * cold_iterations);
+  BOOST_TEST_MESSAGE(warm_iterations << " iterations instead of " << cold_iterations);
+}
+
+BOOST_AUTO_TEST_CASE(a_foot_that_comes_back_knows_what_it_did) {
+  // Lifted and put down again, while it is at the limit of what it can give.
+  Biped biped(113);
+  DynaCoM& dynacom = biped.dynacom;
+  compute(dynacom, restState(biped.model));
+  int solved = 0, relaxed = 0;
+  long warm_iterations = 0, cold_iterations = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    Vector6 wrench = groundWrench(dynacom);
+    wrench.head<3>() += biped.random.vector3(100.);
+    wrench.tail<3>() += biped.random.vector3(trial % 2 == 0 ? 10. : 100.);
+    const auto distributeIt = [&] { return distribute(dynacom, wrench, dynacom.getCoM()); };
+    DynaCoM cold = dynacom;
+    cold.setWarmStart(false);
+    distribute(cold, wrench, dynacom.getCoM());
+    const auto status = distributeIt();
+    distributeIt();  // if the first one was not by Newton's method, this one is
+    distributeIt();
+    const DistributionResult before = dynacom.getDistribution();
+    if (before.iterations > 1) continue;  // one for the robust solver
+    dynacom.deactivateContact("right");
+    dynacom.activateContact("right");
+    BOOST_TEST(distributeIt() == status);
+    BOOST_TEST(dynacom.getDistribution().iterations == 1);
+    BOOST_TEST(close(dynacom.getDistribution().forces() / before.scale,
+                     before.forces() / before.scale, 1e-9));
+    (status == DistributionStatus::Solved ? solved : relaxed) += 1;
+    // After a while on the other foot, which has another task then, it still is of use.
+    dynacom.deactivateContact("right");
+    distributeIt();
+    dynacom.activateContact("right");
+    BOOST_TEST(distributeIt() == status);
+    warm_iterations += dynacom.getDistribution().iterations;
+    cold_iterations += cold.getDistribution().iterations;
+  }
+  BOOST_TEST(solved > 10);
+  BOOST_TEST(relaxed > 50);
+  BOOST_TEST(solved + relaxed > 195);
+  BOOST_TEST(warm_iterations <= cold_iterations);
+  BOOST_TEST_MESSAGE(solved << " solved, " << relaxed << " relaxed; after a while "
+                            << warm_iterations << " iterations instead of " << cold_iterations);
 }
 
 // --- Contacts ----------------------------------------------------------------------------------

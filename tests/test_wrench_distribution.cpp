@@ -3,16 +3,21 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <eiquadprog/eiquadprog-fast.hpp>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <sstream>
 #include <utility>
 #include <vector>
 
+#include "asked_solvers.hpp"
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "dynacom/wrench_distribution.hpp"
+#include "problem_checker.hpp"
+#include "random_problems.hpp"
 #include "test_tools.hpp"
 
 using namespace dynacom;
@@ -137,19 +142,19 @@ VectorXd randomForces(Random& random, const Contacts& contacts, double fraction)
   return forces;
 }
 
-struct Problem {
+struct StackedProblem {
   MatrixXd ne, inequalities;  ///< NE λ = w, A λ ≤ 0
   VectorXd q;                 ///< the diagonal of Q, weights squared
 };
 
 /// The problem of equations (9-13), written down anew from matrices of contacts.
-Problem stackedProblem(const std::vector<DistributionResult::Contact>& contacts) {
+StackedProblem stackedProblem(const std::vector<DistributionResult::Contact>& contacts) {
   Index cols = 0, rows = 0;
   for (const auto& contact : contacts) {
     cols += contact.A.cols();
     rows += contact.A.rows();
   }
-  Problem problem{MatrixXd::Zero(6, cols), MatrixXd::Zero(rows, cols), VectorXd::Zero(cols)};
+  StackedProblem problem{MatrixXd::Zero(6, cols), MatrixXd::Zero(rows, cols), VectorXd::Zero(cols)};
   Index col = 0, row = 0;
   for (const auto& contact : contacts) {
     problem.ne.middleCols(col, contact.A.cols()) = contact.NE;
@@ -161,7 +166,7 @@ Problem stackedProblem(const std::vector<DistributionResult::Contact>& contacts)
   return problem;
 }
 
-Problem stackedProblem(const Contacts& contacts) {
+StackedProblem stackedProblem(const Contacts& contacts) {
   std::vector<DistributionResult::Contact> matrices;
   for (const auto& contact : contacts) {
     matrices.emplace_back();
@@ -209,7 +214,7 @@ double nonNegativeLeastSquares(const MatrixXd& A, const VectorXd& b) {
 /// By how much forces miss the conditions of Karush, Kuhn and Tucker to be the cheapest that give
 /// what they give, relative to the cost's gradient: Q λ + NEᵀ ν + Aᵀ μ = 0 with μ ≥ 0 on the
 /// inequalities that are tight, and 0 elsewhere.
-double costGap(const Problem& problem, const VectorXd& forces, double scale,
+double costGap(const StackedProblem& problem, const VectorXd& forces, double scale,
                Index* tight = nullptr) {
   const VectorXd slack = -problem.inequalities * forces;
   std::vector<Index> rows;
@@ -262,7 +267,7 @@ double distanceBound(const Contacts& contacts, const DistributionResult& result)
 /// What an answer is, by everything but the code that found it: within the cones, the closest, the
 /// cheapest, and summed up.
 void checkAnswer(const Contacts& contacts, const DistributionResult& result) {
-  const Problem problem = stackedProblem(contacts);
+  const StackedProblem problem = stackedProblem(contacts);
   const VectorXd forces = result.forces();
   const double scale = result.scale;
   BOOST_REQUIRE(forces.size() == problem.q.size());
@@ -305,7 +310,7 @@ void forAllFaces(const MatrixXd& matrix, Action action) {
 /// Another way to the answer, stage by stage: on every face of the cone, the forces that come
 /// closest, and then the cheapest that give the closest wrench. Exponential, and without any choice
 /// that could go wrong.
-VectorXd forcesByEnumeration(const Problem& problem, const Vector6& wrenchWeights,
+VectorXd forcesByEnumeration(const StackedProblem& problem, const Vector6& wrenchWeights,
                              const Vector6& wrench) {
   const double size = wrench.norm();
   const auto respects = [&](const VectorXd& forces) {
@@ -451,7 +456,7 @@ BOOST_AUTO_TEST_CASE(strictly_inside_the_cones_the_solution_has_a_closed_form) {
                                makeSole({0., -0.1, 0.}, 0.7, random.vector(6, 0.5, 2.)),
                                makePoint({0.3, random.uniform(-0.1, 0.1), 0.1}),
                                makePoint({-0.3, random.uniform(-0.1, 0.1), 0.1})};
-    const Problem problem = stackedProblem(contacts);
+    const StackedProblem problem = stackedProblem(contacts);
     const Vector6 total = wrench(0., 0., 500.) + Vector6(random.vector(6, 10.));
     const MatrixXd mapped = problem.q.cwiseInverse().asDiagonal() * problem.ne.transpose();
     const VectorXd expected = mapped * (problem.ne * mapped).ldlt().solve(total);
@@ -473,7 +478,7 @@ BOOST_AUTO_TEST_CASE(forces_sum_to_the_wrench_within_the_cones_at_the_lowest_cos
     // The sum of forces within the cones can be distributed, of course; of forces on their
     // boundary, too.
     const Contacts contacts = randomContacts(random);
-    const Problem problem = stackedProblem(contacts);
+    const StackedProblem problem = stackedProblem(contacts);
     const double fraction = random.coin() ? random.uniform(0., 1.) : 1.;
     const VectorXd given = randomForces(random, contacts, fraction);
     const Vector6 total = problem.ne * given;
@@ -498,7 +503,7 @@ BOOST_AUTO_TEST_CASE(forces_sum_to_the_wrench_within_the_cones_at_the_lowest_cos
 BOOST_AUTO_TEST_CASE(the_check_of_optimality_knows_what_is_not_optimal) {
   // Forces that sum to the wrench within the cones, but are not the cheapest.
   const Contacts contacts = twoSoles();
-  const Problem problem = stackedProblem(contacts);
+  const StackedProblem problem = stackedProblem(contacts);
   VectorXd forces(12);
   forces << 0., 0., 250., 0., 0., 0., 0., 0., 250., 0., 0., 0.;
   BOOST_TEST(costGap(problem, forces, 500.) < 1e-12);
@@ -611,7 +616,7 @@ BOOST_AUTO_TEST_CASE(answers_agree_with_an_enumeration_of_all_faces) {
       contact.NE = random.vector(6 * cols).reshaped(6, cols);
       distribution.add(contact.A, contact.weights, contact.NE);
     }
-    const Problem problem = stackedProblem(contacts);
+    const StackedProblem problem = stackedProblem(contacts);
     Vector6 total = random.vector(6, 100.);
     // Half of them lie in the span of what can be given, and some of these are within reach.
     if (random.coin()) total = problem.ne * random.vector(problem.q.size(), 100.);
@@ -646,7 +651,7 @@ BOOST_AUTO_TEST_CASE(two_points_or_a_sole_agree_with_an_enumeration_of_all_faces
     }
     WrenchDistribution distribution;
     distribution.setWrenchWeights(randomWrenchWeights(random));
-    const Problem problem = stackedProblem(contacts);
+    const StackedProblem problem = stackedProblem(contacts);
     const Vector6 total = Vector6(problem.ne * randomForces(random, contacts, 1.)) +
                           Vector6(random.vector(6, random.coin() ? 100. : 0.));
     BOOST_TEST_CONTEXT("problem " << trial) {
@@ -803,7 +808,7 @@ BOOST_AUTO_TEST_CASE(any_cone_is_taken_with_its_own_inequalities) {
     const VectorXd given = random.vector(6 * hands, 100.);
     for (Index i = 0; i < hands; ++i)
       contacts.push_back(std::make_shared<Hand>(random, given.segment<6>(6 * i)));
-    const Problem problem = stackedProblem(contacts);
+    const StackedProblem problem = stackedProblem(contacts);
     Vector6 total = problem.ne * given;
     const bool withinReach = random.coin();
     if (!withinReach) total = random.vector(6, 100.);
@@ -855,7 +860,7 @@ BOOST_AUTO_TEST_CASE(eiquadprog_finds_the_same_forces) {
     for (Index count = random.integer(1, 4); count > 0; --count)
       contacts.push_back(
           makeSole(soleSettings(0.7, random.vector(6, 0.5, 2.)), random.placement()));
-    const Problem problem = stackedProblem(contacts);
+    const StackedProblem problem = stackedProblem(contacts);
     VectorXd given(problem.q.size());
     for (std::size_t k = 0; k < contacts.size(); ++k)
       given.segment<6>(6 * static_cast<Index>(k)) =
@@ -918,7 +923,7 @@ BOOST_AUTO_TEST_CASE(corners_of_the_cones_of_nearly_parallel_soles_are_reached) 
     BOOST_TEST_CONTEXT("problem " << i) {
       WrenchDistribution distribution;
       BOOST_TEST(solve(distribution, contacts, total) == DistributionStatus::Solved);
-      const Problem problem = stackedProblem(contacts);
+      const StackedProblem problem = stackedProblem(contacts);
       const VectorXd forces = distribution.result().forces();
       BOOST_TEST((problem.ne * forces - total).norm() <= 1e-8 * total.norm());
       BOOST_TEST((problem.inequalities * forces).maxCoeff() <= 1e-9 * total.norm());
@@ -1199,7 +1204,7 @@ BOOST_AUTO_TEST_CASE(beyond_the_largest_numbers_forces_are_kept_too) {
 BOOST_AUTO_TEST_CASE(the_result_holds_the_problem) {
   Random random(42);
   const Contacts contacts = randomContacts(random);
-  const Problem problem = stackedProblem(contacts);
+  const StackedProblem problem = stackedProblem(contacts);
   const Vector6 total = problem.ne * randomForces(random, contacts, 0.9);
   WrenchDistribution distribution;
   BOOST_TEST(solve(distribution, contacts, total) == DistributionStatus::Solved);
@@ -2022,4 +2027,656 @@ BOOST_AUTO_TEST_CASE(the_margin_changes_nothing) {
   BOOST_TEST(distribution.computeMargin().margin == margin);
   BOOST_TEST(distribution.solve(Vector6::Constant(kNaN)) == DistributionStatus::InvalidInput);
   BOOST_TEST(close(distribution.result().forces(), before.forces(), 0.));
+}
+
+// --- Slots -----------------------------------------------------------------------------------
+
+namespace {
+
+using Slots = std::vector<std::size_t>;
+
+/// Solves for a wrench with the contacts in some slots, of which slot k is contact k's.
+DistributionStatus solveSlots(WrenchDistribution& distribution, const Contacts& contacts,
+                              const Slots& slots, const Vector6& wrench, double minimalScale = 0.) {
+  distribution.clear();
+  for (const std::size_t slot : slots) distribution.add(*contacts[slot], slot);
+  return distribution.solve(wrench, minimalScale);
+}
+
+void reserveAll(WrenchDistribution& distribution, const Contacts& contacts) {
+  for (std::size_t slot = 0; slot < contacts.size(); ++slot)
+    distribution.reserve(*contacts[slot], slot);
+}
+
+/// Some of the slots of so many contacts, one or more, in any order.
+Slots randomSlots(Random& random, std::size_t contacts) {
+  Slots slots(contacts);
+  std::iota(slots.begin(), slots.end(), 0);
+  for (std::size_t k = contacts - 1; k > 0; --k)
+    std::swap(slots[k], slots[static_cast<std::size_t>(random.integer(0, Index(k)))]);
+  slots.resize(static_cast<std::size_t>(random.integer(1, Index(contacts))));
+  return slots;
+}
+
+template <class Numbers>
+bool sameBits(const Numbers& one, const Numbers& other) {
+  using Scalar = typename Numbers::Scalar;
+  return one.rows() == other.rows() && one.cols() == other.cols() &&
+         (one.size() == 0 ||
+          std::memcmp(one.data(), other.data(),
+                      static_cast<std::size_t>(one.size()) * sizeof(Scalar)) == 0);
+}
+
+/// Whether two results are the same, bit for bit, in all that they hold.
+boost::test_tools::predicate_result identical(const DistributionResult& one,
+                                              const DistributionResult& other) {
+  boost::test_tools::predicate_result result(false);
+  const auto say = [&](const char* what) { result.message() << "another " << what; };
+  if (one.status != other.status)
+    say("status");
+  else if (one.iterations != other.iterations)
+    result.message() << one.iterations << " iterations instead of " << other.iterations;
+  else if (!sameBits(one.wrench, other.wrench) || !sameBits(one.achieved, other.achieved) ||
+           !sameBits(one.residual, other.residual))
+    say("wrench");
+  else if (!sameBits(Vector2d(one.scale, one.cost), Vector2d(other.scale, other.cost)))
+    say("scale or cost");
+  else if (!sameBits(one.wrench_multipliers, other.wrench_multipliers))
+    say("multiplier");
+  else if (one.contacts.size() != other.contacts.size())
+    say("number of contacts");
+  else
+    result = true;
+  if (!result) return result;
+  for (std::size_t k = 0; k < one.contacts.size(); ++k) {
+    const auto &a = one.contacts[k], &b = other.contacts[k];
+    if (sameBits(a.A, b.A) && sameBits(a.weights, b.weights) && sameBits(a.NE, b.NE) &&
+        sameBits(a.force, b.force) && sameBits(a.multipliers, b.multipliers) &&
+        sameBits(a.relaxation_multipliers, b.relaxation_multipliers) &&
+        sameBits(a.active, b.active))
+      continue;
+    result = false;
+    result.message() << "another contact " << k;
+  }
+  return result;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(slots_change_nothing_but_the_order) {
+  Random random(201);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Contacts contacts = randomContacts(random);
+    WrenchDistribution slotted, plain;
+    reserveAll(slotted, contacts);
+    for (int step = 0; step < 5; ++step) {
+      const Slots slots = randomSlots(random, contacts.size());
+      Contacts chosen;
+      for (const std::size_t slot : slots) chosen.push_back(contacts[slot]);
+      const Vector6 total = wrench(0., 0., 500.) + Vector6(random.vector(6, step < 3 ? 50. : 500.));
+      slotted.setWarmStart(false);
+      plain.setWarmStart(false);
+      solveSlots(slotted, contacts, slots, total);
+      solve(plain, chosen, total);
+      // The contacts of the result are those that were added, in that order.
+      BOOST_TEST(identical(slotted.result(), plain.result()));
+      for (std::size_t k = 0; k < slots.size(); ++k)
+        BOOST_TEST(close(slotted.result().contacts[k].NE, chosen[k]->ne_A(), 0.));
+      // And so they are with warm start, but for rounding.
+      slotted.setWarmStart(true);
+      BOOST_TEST(solveSlots(slotted, contacts, slots, total) == plain.result().status);
+      BOOST_TEST(close(slotted.result().forces() / slotted.result().scale,
+                       plain.result().forces() / plain.result().scale, 1e-9));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(forces_are_kept_by_order_and_slot) {
+  const Contacts contacts = {makeSole({0., 0.1, 0.}), makeSole({0., -0.1, 0.}),
+                             makeSole({0.2, 0., 0.})};
+  const Vector6 total = wrench(20., 0., 500., 1., 2., 3.), none = Vector6::Constant(kNaN);
+  WrenchDistribution distribution;
+  reserveAll(distribution, contacts);
+  const auto kept = [&](const Slots& before, const Slots& after) {
+    BOOST_TEST(solveSlots(distribution, contacts, before, total) == DistributionStatus::Solved);
+    const VectorXd forces = distribution.result().forces();
+    BOOST_TEST(solveSlots(distribution, contacts, after, none) == DistributionStatus::InvalidInput);
+    if (isZero(distribution.result().forces())) return false;
+    BOOST_TEST(close(distribution.result().forces(), forces, 0.));
+    return true;
+  };
+  BOOST_TEST(kept({0, 1}, {0, 1}));
+  BOOST_TEST(kept({2, 1, 0}, {2, 1, 0}));
+  BOOST_TEST(!kept({0, 1}, {1, 0}));
+  BOOST_TEST(!kept({0, 1}, {0, 2}));  // with the same matrices
+  BOOST_TEST(!kept({0, 1}, {0, 1, 2}));
+  BOOST_TEST(!kept({0, 1, 2}, {0, 1}));
+}
+
+BOOST_AUTO_TEST_CASE(the_contact_of_a_slot_may_become_another) {
+  Random random(202);
+  WrenchDistribution distribution;
+  for (int trial = 0; trial < 100; ++trial) {
+    const Contacts contacts = randomContacts(random);  // others than before, of any size
+    const Vector6 total = random.vector(6, 500.);
+    const auto status = solve(distribution, contacts, total);
+    WrenchDistribution fresh;
+    BOOST_TEST(solve(fresh, contacts, total) == status);
+    BOOST_TEST(close(distribution.result().forces() / distribution.result().scale,
+                     fresh.result().forces() / fresh.result().scale, 1e-9));
+    BOOST_TEST(distribution.result().isOptimal());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(mistakes_with_slots_are_named_and_change_nothing) {
+  const Contacts contacts = {makeSole({0., 0.1, 0.}), makeSole({0., -0.1, 0.})};
+  const auto point = makePoint(Vector3d(0., 0., 0.));
+  WrenchDistribution distribution;
+  const auto check = [&](auto mistake, std::initializer_list<std::string> words) {
+    const DistributionResult before = distribution.result();
+    BOOST_TEST(throws<std::invalid_argument>(mistake, words));
+    BOOST_TEST(identical(distribution.result(), before));
+  };
+  const auto add = [&](const ContactBase& contact, std::size_t slot) {
+    return [&distribution, &contact, slot] { distribution.add(contact, slot); };
+  };
+  const auto reserve = [&](const ContactBase& contact, std::size_t slot) {
+    return [&distribution, &contact, slot] { distribution.reserve(contact, slot); };
+  };
+  const Contact6D empty;
+  // There is none yet: the first that is free is 0.
+  check(add(*point, 1), {"slot", "0", "1"});
+  check(reserve(*point, 7), {"slot", "0", "7"});
+  check(reserve(empty, 0), {"initialised"});
+  check(add(empty, 0), {"initialised"});
+  distribution.add(*contacts[0], 0);
+  distribution.add(*contacts[1], 1);
+  check(add(*point, 3), {"slot", "2", "3"});
+  check(add(*point, 0), {"slot", "0", "taken"});
+  check(add(*contacts[1], 1), {"slot", "1", "taken"});
+  check(reserve(empty, 2), {"initialised"});
+  check(reserve(empty, 1), {"initialised"});
+  check([&] { distribution.add(*point, std::size_t(-1)); }, {"slot", "2"});
+  BOOST_TEST(distribution.solve(wrench(0., 0., 500.)) == DistributionStatus::Solved);
+  BOOST_TEST(distribution.result().contacts.size() == 2u);
+  BOOST_TEST(close(distribution.result().forces()[2], 250., 1e-10));
+  BOOST_TEST(close(distribution.result().forces()[8], 250., 1e-10));
+  // After an answer, too, which is kept.
+  check(add(*point, 1), {"slot", "1", "taken"});
+  check(add(*point, 4), {"slot", "2", "4"});
+  BOOST_TEST(distribution.solve(Vector6::Constant(kNaN)) == DistributionStatus::InvalidInput);
+  BOOST_TEST(close(distribution.result().forces()[2], 250., 1e-10));
+  // Without a slot, a contact's position is its slot, taken or not.
+  distribution.clear();
+  distribution.add(*contacts[0], 1);
+  check([&] { distribution.add(*contacts[1]); }, {"slot", "1", "taken"});
+  distribution.add(*contacts[1], 0);
+  BOOST_TEST(distribution.solve(wrench(0., 0., 500.)) == DistributionStatus::Solved);
+  BOOST_TEST(close(distribution.result().contacts[0].NE, contacts[0]->ne_A(), 0.));
+}
+
+BOOST_AUTO_TEST_CASE(reserving_changes_no_problem) {
+  const Contacts contacts = {makeSole({0., 0.1, 0.}), makeSole({0., -0.1, 0.}),
+                             makePoint(Vector3d(0.3, 0., 0.))};
+  WrenchDistribution distribution, plain;
+  reserveAll(distribution, contacts);
+  BOOST_TEST(distribution.result().contacts.empty());
+  BOOST_TEST(distribution.solve(wrench(0., 0., 500.)) == DistributionStatus::NoContact);
+  distribution.add(*contacts[0], 0);
+  plain.add(*contacts[0]);
+  distribution.reserve(*contacts[2], 2);
+  distribution.reserve(*contacts[2], 3);
+  plain.solve(wrench(10., 0., 500.));
+  distribution.solve(wrench(10., 0., 500.));
+  BOOST_TEST(identical(distribution.result(), plain.result()));
+  // What was never placed can be reserved, and not added.
+  const Contact6D unplaced(soleSettings());
+  distribution.reserve(unplaced, 4);
+  BOOST_TEST(throws<NotReadyError>([&] { distribution.add(unplaced, 4); }, {"updateNewtonEuler"}));
+  BOOST_TEST(identical(distribution.result(), plain.result()));
+}
+
+BOOST_AUTO_TEST_CASE(a_contact_that_was_added_is_not_changed_by_reserving_its_slot) {
+  // What is added is copied. It may be refused, too.
+  const auto sole = makeSole({0., 0., 0.});
+  for (const std::shared_ptr<ContactBase>& other :
+       {makeSole({0., 0., 0.}, 0.1), makePoint(Vector3d(0., 0., 0.))}) {
+    WrenchDistribution distribution, plain;
+    distribution.add(*sole, 0);
+    try {
+      distribution.reserve(*other, 0);
+    } catch (const std::invalid_argument&) {
+    }
+    plain.add(*sole);
+    distribution.solve(wrench(100., 0., 500.));
+    plain.solve(wrench(100., 0., 500.));
+    BOOST_TEST(identical(distribution.result(), plain.result()));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(reset_leaves_settings_only) {
+  WrenchDistribution distribution;
+  distribution.setWrenchWeights(Vector6::Constant(2.));
+  distribution.setWarmStart(false);
+  distribution.setMaximalIterations(17);
+  solve(distribution, twoSoles(), wrench(0., 0., 500.));
+  distribution.reset();
+  BOOST_TEST(distribution.result().contacts.empty());
+  BOOST_TEST(std::isnan(distribution.result().scale));
+  BOOST_TEST(throws<std::invalid_argument>(
+      [&] {
+        distribution.add(*makeSole({0., 0., 0.}), 1);
+      },
+      {"slot", "0", "1"}));
+  BOOST_TEST(distribution.solve(wrench(0., 0., 500.)) == DistributionStatus::NoContact);
+  BOOST_TEST(close(distribution.getWrenchWeights(), Vector6::Constant(2.), 0.));
+  BOOST_TEST(!distribution.getWarmStart());
+  BOOST_TEST(distribution.getMaximalIterations() == 17);
+}
+
+// --- Warm start ------------------------------------------------------------------------------
+
+namespace {
+
+/// Where the wrenches of a walk are.
+enum class Stance { Inside, Facet, Corner, Anywhere, Thrown };
+
+/// A force of a contact: within its inequalities, on one of them, or in a corner of them all.
+VectorXd forceAt(Random& random, const ContactBase& contact, Stance stance) {
+  const VectorXd inside = randomForce(random, contact, 0.95), bound = [&] {
+    const MatrixXd A = stackedProblem(Contacts{contact.clone()}).inequalities;
+    // By how much each component may be, for this normal force.
+    VectorXd bound = VectorXd::Zero(contact.cols());
+    for (Index row = 0; row < A.rows(); ++row)
+      for (Index i = 0; i < A.cols(); ++i)
+        if (i != 2 && A(row, i) > 0.) bound[i] = -A(row, 2) * inside[2] / A(row, i);
+    return bound;
+  }();
+  VectorXd force = inside;
+  const Index facet = random.integer(0, contact.cols() - 1);
+  for (Index i = 0; i < contact.cols(); ++i)
+    if (i != 2 && (stance == Stance::Corner || (stance == Stance::Facet && i == facet)))
+      force[i] = inside[i] < 0. ? -bound[i] : bound[i];
+  return force;
+}
+
+/// A robot that stands, walks and falls: contacts that are activated and deactivated, and move a
+/// little, and wrenches that change a little, or jump.
+class Walk {
+ public:
+  Walk(unsigned seed, bool degenerate) : random_(seed), degenerate_(degenerate) {
+    contacts_ = randomContacts(random_);
+    if (!degenerate) {  // with weights that are equal, friction and extent
+      for (auto& contact : contacts_) {
+        const SE3 pose(randomTilt(random_, 0.3), random_.vector3(0.4));
+        contact = random_.coin() ? makeSole(soleSettings(), pose) : makePoint(pose);
+      }
+    }
+    for (const auto& contact : contacts_) poses_.push_back(contact->getPose());
+    slots_.resize(contacts_.size());
+    std::iota(slots_.begin(), slots_.end(), 0);
+    wrench_weights_ = degenerate ? Vector6(Eigen::pow(10., random_.vector(6, 0.5).array()))
+                                 : Vector6(Vector6::Ones());
+    jump();
+  }
+
+  void step() {
+    if (random_.integer(0, 9) == 0) {
+      const auto slot = static_cast<std::size_t>(random_.integer(0, Index(contacts_.size()) - 1));
+      const auto active = std::find(slots_.begin(), slots_.end(), slot);
+      if (active == slots_.end())
+        slots_.push_back(slot);
+      else if (slots_.size() > 1)
+        slots_.erase(active);
+    }
+    for (std::size_t slot = 0; slot < contacts_.size(); ++slot) {
+      if (random_.coin()) poses_[slot].translation() += random_.vector3(1e-3);
+      contacts_[slot]->updateNewtonEuler(Vector3d::UnitZ(), poses_[slot]);
+    }
+    if (random_.integer(0, 9) == 0)
+      jump();
+    else if ((stance == Stance::Facet || stance == Stance::Corner) && random_.coin())
+      standThere();
+    else
+      total += random_.vector(6, 3.);
+  }
+
+  DistributionStatus solve(WrenchDistribution& distribution) const {
+    distribution.setWrenchWeights(wrench_weights_);
+    return solveSlots(distribution, contacts_, slots_, total);
+  }
+
+  const Contacts& contacts() const { return contacts_; }
+
+  Stance stance = Stance::Inside;
+  Vector6 total = Vector6::Zero();
+
+ private:
+  void jump() {
+    stance = static_cast<Stance>(random_.integer(0, 4));
+    if (!degenerate_ && (stance == Stance::Facet || stance == Stance::Corner))
+      stance = Stance::Inside;
+    if (stance == Stance::Anywhere || stance == Stance::Thrown)
+      total = wrench(0., 0., 500.) +
+              Vector6(random_.vector(6, stance == Stance::Anywhere ? 300. : 1000.));
+    else
+      standThere();
+  }
+
+  void standThere() {
+    total.setZero();
+    for (const std::size_t slot : slots_)
+      total += contacts_[slot]->ne_A() * forceAt(random_, *contacts_[slot], stance);
+  }
+
+  Random random_;
+  bool degenerate_;
+  Contacts contacts_;
+  std::vector<SE3> poses_;
+  Slots slots_;
+  Vector6 wrench_weights_;
+};
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(warm_start_is_automatic_and_can_be_switched_off) {
+  WrenchDistribution distribution;
+  BOOST_TEST(distribution.getWarmStart());
+  distribution.setWarmStart(false);
+  BOOST_TEST(!distribution.getWarmStart());
+  BOOST_TEST(!WrenchDistribution(distribution).getWarmStart());
+  BOOST_TEST(WrenchDistribution().getWarmStart());
+  distribution.setWarmStart(true);
+  BOOST_TEST(distribution.getWarmStart());
+}
+
+BOOST_AUTO_TEST_CASE(warm_start_never_changes_an_answer) {
+  int solved = 0, relaxed = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    Walk walk(300 + seed, seed % 4 > 0);
+    WrenchDistribution warm, cold;
+    cold.setWarmStart(false);
+    reserveAll(warm, walk.contacts());
+    reserveAll(cold, walk.contacts());
+    for (int step = 0; step < 60; ++step) {
+      walk.step();
+      const auto status = walk.solve(warm);
+      BOOST_TEST_CONTEXT("walk " << seed << ", step " << step) {
+        BOOST_TEST(walk.solve(cold) == status);
+        const DistributionResult &result = warm.result(), &expected = cold.result();
+        const double scale = result.scale;
+        BOOST_TEST(close(result.forces() / scale, expected.forces() / scale, 1e-9));
+        BOOST_TEST(close(result.achieved / scale, expected.achieved / scale, 1e-9));
+        BOOST_TEST(close(result.residual / scale, expected.residual / scale, 1e-9));
+        BOOST_TEST(close(result.cost / (scale * scale), expected.cost / (scale * scale), 1e-9));
+        BOOST_TEST(result.isOptimal());
+        BOOST_TEST(expected.isOptimal());
+      }
+      (status == DistributionStatus::Solved ? solved : relaxed) += 1;
+    }
+  }
+  BOOST_TEST(solved > 3000);
+  BOOST_TEST(relaxed > 3000);
+}
+
+BOOST_AUTO_TEST_CASE(warm_start_saves_iterations) {
+  long warm_iterations = 0, cold_iterations = 0, all = 0, at_once = 0, degenerate = 0,
+       degenerate_at_once = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    const bool is_degenerate = seed % 2 == 1;
+    Walk walk(600 + seed, is_degenerate);
+    WrenchDistribution warm, cold;
+    cold.setWarmStart(false);
+    reserveAll(warm, walk.contacts());
+    reserveAll(cold, walk.contacts());
+    for (int step = 0; step < 40; ++step) {
+      walk.step();
+      walk.solve(warm);
+      walk.solve(cold);
+      warm_iterations += warm.result().iterations;
+      cold_iterations += cold.result().iterations;
+      if (countAskedSolvers(cold.result()) > 1) continue;
+      // The same again: the state that led to an answer is where the next solve() begins. Now and
+      // then the robust solver was asked for the first one, of which there is no such state.
+      const VectorXd forces = warm.result().forces() / warm.result().scale;
+      walk.solve(warm);
+      const bool once = warm.result().iterations == 1;
+      BOOST_TEST(close(warm.result().forces() / warm.result().scale, forces, 1e-9));
+      walk.solve(warm);
+      if (is_degenerate) {
+        ++degenerate;
+        if (once) ++degenerate_at_once;
+      } else {
+        ++all;
+        if (once) ++at_once;
+        BOOST_TEST(warm.result().iterations == 1);
+      }
+    }
+  }
+  BOOST_TEST(warm_iterations < 0.75 * cold_iterations);
+  BOOST_TEST(all > 3000);
+  BOOST_TEST(at_once > 0.995 * all);
+  // Where components of the answer are just at their bounds, rounding may take some of them for
+  // another state.
+  BOOST_TEST(degenerate > 3000);
+  BOOST_TEST(degenerate_at_once > 0.98 * degenerate);
+  BOOST_TEST_MESSAGE(warm_iterations << " iterations instead of " << cold_iterations << "; again "
+                                     << at_once << " of " << all << " and " << degenerate_at_once
+                                     << " of " << degenerate << " in one step");
+}
+
+BOOST_AUTO_TEST_CASE(a_slow_walk_takes_hardly_more_than_one_iteration) {
+  // At the limit of friction, and beyond it: at a kilohertz nothing changes much.
+  for (const double push : {0., 200., 400.}) {
+    const Contacts contacts = {makeSole({0., 0.1, -1.}), makeSole({0., -0.1, -1.})};
+    WrenchDistribution warm, cold;
+    cold.setWarmStart(false);
+    int warm_iterations = 0, cold_iterations = 0;
+    const int steps = 1000;
+    for (int step = 0; step < steps; ++step) {
+      const double phase = 2. * M_PI * step / steps;
+      const Vector6 total = wrench(push, 30. * std::sin(phase), 500. + 50. * std::cos(phase),
+                                   10. * std::cos(phase), -push + 10. * std::sin(phase), 5.);
+      solve(warm, contacts, total);
+      solve(cold, contacts, total);
+      BOOST_TEST(warm.result().status == cold.result().status);
+      warm_iterations += warm.result().iterations;
+      cold_iterations += cold.result().iterations;
+    }
+    BOOST_TEST(warm_iterations < 1.1 * steps);
+    BOOST_TEST(warm_iterations <= cold_iterations);
+    BOOST_TEST_MESSAGE("pushed by " << push << " N: " << warm_iterations << " instead of "
+                                    << cold_iterations);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(without_warm_start_nothing_before_matters) {
+  // Bit for bit, by whichever solver.
+  ProblemGenerator generator(203);
+  WrenchDistribution used;
+  used.setWarmStart(false);
+  std::array<int, 4> asked{};
+  for (int trial = 0; trial < 3000; ++trial) {
+    const dynacom_tests::Problem problem = generator.next();
+    const Contacts contacts = problem.makeContacts();
+    // Now and then with an answer or a failure between.
+    if (trial % 5 == 0) solve(used, contacts, Vector6::Constant(kNaN));
+    used.setWarmStart(trial % 7 == 0);
+    if (trial % 7 == 0) solve(used, contacts, problem.wrench.reverse());
+    used.setWarmStart(false);
+    WrenchDistribution fresh, warm;
+    for (WrenchDistribution* distribution : {&used, &fresh, &warm}) {
+      distribution->setWrenchWeights(problem.wrench_weights);
+      solve(*distribution, contacts, problem.wrench, problem.minimal_scale);
+    }
+    BOOST_TEST_CONTEXT("problem " << trial) {
+      BOOST_TEST(identical(used.result(), fresh.result()));
+      BOOST_TEST(identical(warm.result(), fresh.result()));
+    }
+    if (!isZero(problem.wrench))
+      ++asked[static_cast<std::size_t>(countAskedSolvers(fresh.result()))];
+  }
+  BOOST_TEST(asked[0] == 0);
+  BOOST_TEST(asked[1] > 1000);
+  BOOST_TEST(asked[2] > 20);
+  BOOST_TEST(asked[3] > 50);
+}
+
+BOOST_AUTO_TEST_CASE(the_same_history_gives_the_same_bits) {
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    Walk walk(900 + seed, seed % 2 == 0);
+    WrenchDistribution one, other;
+    reserveAll(one, walk.contacts());
+    reserveAll(other, walk.contacts());
+    for (int step = 0; step < 40; ++step) {
+      walk.step();
+      walk.solve(one);
+      walk.solve(other);
+      BOOST_TEST(identical(one.result(), other.result()));
+      if (step == 20) {
+        // A copy goes on as the original would.
+        WrenchDistribution copy = one;
+        other = std::move(copy);
+      }
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(warm_start_survives_that_a_contact_takes_no_part_for_a_while) {
+  Random random(204);
+  int trials = 0, cold_iterations = 0;
+  while (trials < 200) {
+    Contacts contacts;
+    for (int i = 0; i < 3; ++i)
+      contacts.push_back(
+          makeSole(soleSettings(),
+                   SE3(randomTilt(random, 0.3), Vector3d(0.3 * i, 0., -1.) + random.vector3(0.1))));
+    WrenchDistribution distribution;
+    reserveAll(distribution, contacts);
+    // A wrench that is in reach, and wants inequalities to be active in all contacts, but leaves to
+    // any two of them what it takes to give all wrenches.
+    Vector6 total = Vector6::Zero();
+    for (const auto& contact : contacts)
+      total += contact->ne_A() * forceAt(random, *contact, Stance::Facet);
+    if (solveSlots(distribution, contacts, {0, 1, 2}, total) != DistributionStatus::Solved)
+      continue;
+    const DistributionResult first = distribution.result();
+    const auto fits = [](const auto& contact) {
+      return contact.active.any() && contact.active.count() <= 3;
+    };
+    if (!std::all_of(first.contacts.begin(), first.contacts.end(), fits)) continue;
+    ++trials;
+    cold_iterations += first.iterations;
+    solveSlots(distribution, contacts, {0, 1, 2}, total);
+    BOOST_TEST(distribution.result().iterations == 1);
+
+    // While one takes no part, the others go on to do what they did: that is the cheapest way to
+    // give what they give.
+    const auto away = static_cast<std::size_t>(random.integer(0, 2));
+    const Slots others = {(away + 1) % 3, (away + 2) % 3};
+    const Vector6 of_others = total - first.contacts[away].NE * first.contacts[away].force;
+    for (int tick = 0; tick < 3; ++tick) {
+      BOOST_TEST(solveSlots(distribution, contacts, others, of_others) ==
+                 DistributionStatus::Solved);
+      BOOST_TEST(distribution.result().iterations == 1);
+    }
+    // Back again, as the last one now, it still knows what it did.
+    BOOST_TEST(solveSlots(distribution, contacts, {others[0], others[1], away}, total) ==
+               DistributionStatus::Solved);
+    BOOST_TEST(distribution.result().iterations == 1);
+    BOOST_TEST(close(distribution.result().contacts[2].force, first.contacts[away].force, 1e-9));
+  }
+  BOOST_TEST(cold_iterations > 3 * trials);
+}
+
+// --- The iteration cap -----------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(the_number_of_iterations_is_a_setting) {
+  WrenchDistribution distribution;
+  BOOST_TEST(distribution.getMaximalIterations() == WrenchDistribution::kMaximalIterations);
+  distribution.setMaximalIterations(1);
+  BOOST_TEST(distribution.getMaximalIterations() == 1);
+  for (const int bad : {0, -1, std::numeric_limits<int>::min()}) {
+    BOOST_TEST(throws<std::invalid_argument>([&] { distribution.setMaximalIterations(bad); },
+                                             {"maximalIterations", "> 0", std::to_string(bad)}));
+    BOOST_TEST(distribution.getMaximalIterations() == 1);
+  }
+  BOOST_TEST(WrenchDistribution(distribution).getMaximalIterations() == 1);
+  distribution.setMaximalIterations(std::numeric_limits<int>::max());
+  BOOST_TEST(solve(distribution, twoSoles(), wrench(900., 0., 500.)) ==
+             DistributionStatus::Relaxed);
+}
+
+BOOST_AUTO_TEST_CASE(no_more_iterations_are_taken_than_are_allowed) {
+  ProblemGenerator generator(205);
+  std::array<int, 4> asked{};
+  long answers = 0, failures = 0;
+  for (int trial = 0; trial < 700; ++trial) {
+    const dynacom_tests::Problem problem = generator.next();
+    const Contacts contacts = problem.makeContacts();
+    WrenchDistribution distribution;
+    distribution.setWarmStart(trial % 2 == 0);
+    distribution.setWrenchWeights(problem.wrench_weights);
+    const auto status = solve(distribution, contacts, problem.wrench, problem.minimal_scale);
+    const DistributionResult right = distribution.result();
+    BOOST_TEST(right.iterations <= WrenchDistribution::kMaximalIterations);
+    if (right.iterations < 3) continue;
+    ++asked[static_cast<std::size_t>(countAskedSolvers(right))];
+
+    Vector6 easy = Vector6::Zero();
+    for (const auto& contact : contacts) easy += right.scale * contact->ne_A().col(2);
+    for (int limit = 1; limit <= 40; ++limit) {
+      distribution.setMaximalIterations(WrenchDistribution::kMaximalIterations);
+      solve(distribution, contacts, easy, problem.minimal_scale);
+      const VectorXd before = distribution.result().forces();
+      distribution.setMaximalIterations(limit);
+      solve(distribution, contacts, problem.wrench, problem.minimal_scale);
+      const DistributionResult& result = distribution.result();
+      BOOST_TEST_CONTEXT("problem " << trial << ", limit " << limit) {
+        BOOST_TEST(result.iterations <= limit);
+        if (result.status == DistributionStatus::NumericalFailure) {
+          ++failures;
+          BOOST_TEST(sameBits(result.forces(), before));
+          checkNoAnswer(result);
+          if (!distribution.getWarmStart()) BOOST_TEST(limit < right.iterations);
+        } else {
+          ++answers;
+          BOOST_TEST(result.status == status);
+          BOOST_TEST(result.isOptimal());
+          if (problem.nearly_parallel || problem.weights_far_apart) continue;
+          BOOST_TEST(check(problem, result).error == "");
+          BOOST_TEST(close(result.forces() / result.scale, right.forces() / right.scale, 1e-7));
+        }
+      }
+    }
+  }
+  BOOST_TEST(asked[1] > 200);
+  BOOST_TEST(asked[2] + asked[3] > 15);
+  BOOST_TEST(answers > 10000);
+  BOOST_TEST(failures > 2000);
+}
+
+BOOST_AUTO_TEST_CASE(without_an_answer_before_forces_are_zero_when_iterations_are_used_up) {
+  WrenchDistribution distribution;
+  distribution.setMaximalIterations(1);
+  const Vector6 total = wrench(900., 300., 500., 50., 60., 70.);
+  BOOST_TEST(solve(distribution, twoSoles(), total) == DistributionStatus::NumericalFailure);
+  BOOST_TEST(distribution.result().iterations == 1);
+  BOOST_TEST(isZero(distribution.result().forces()));
+  checkNoAnswer(distribution.result());
+  BOOST_TEST(std::isnan(distribution.computeMargin().margin));
+  // With more, there is one, and it is kept while contacts are the same.
+  distribution.setMaximalIterations(WrenchDistribution::kMaximalIterations);
+  BOOST_TEST(solve(distribution, twoSoles(), total) == DistributionStatus::Relaxed);
+  const VectorXd forces = distribution.result().forces();
+  BOOST_TEST(distribution.result().isOptimal());
+  distribution.setMaximalIterations(1);
+  distribution.setWarmStart(false);
+  BOOST_TEST(solve(distribution, twoSoles(), total) == DistributionStatus::NumericalFailure);
+  BOOST_TEST(close(distribution.result().forces(), forces, 0.));
+  BOOST_TEST(close(distribution.result().residual, total - distribution.result().achieved));
+  // The margin is not limited.
+  BOOST_TEST(solve(distribution, twoSoles(), wrench(0., 0., 500.)) == DistributionStatus::Solved);
+  BOOST_TEST(distribution.result().iterations == 1);
+  BOOST_TEST(distribution.computeMargin().margin > 10.);
 }
