@@ -39,6 +39,10 @@ void exposeContactBase() {
            "Index of that frame in a model; a very large number before DynaCoM.addContact.")
       .def("setFrameID", &ContactBase::setFrameID, (bp::arg("self"), bp::arg("frame_id")),
            "Tells which frame of a model is the contact's. DynaCoM does.")
+      .def("getRevision", &ContactBase::getRevision, bp::arg("self"),
+           "Number of the matrices but for ne_A: another one whenever they may have changed, and "
+           "no\n"
+           "other contact's unless they are copies of each other; 0 before there are any.")
       .def("getPose", &ContactBase::getPose, bp::arg("self"), Copied(),
            "Placement of the contact's frame in the world (pinocchio.SE3).")
       .def("setPose", &ContactBase::setPose, (bp::arg("self"), bp::arg("pose")),

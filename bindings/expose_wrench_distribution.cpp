@@ -208,7 +208,7 @@ void exposeWrenchDistribution() {
            (bp::arg("self"), bp::arg("contact"), bp::arg("slot")),
            "Gets a slot's storage ready for a contact, so that a problem with it allocates\n"
            "nothing, whichever of the other slots take part. ValueError if the contact was never\n"
-           "initialised, or slot is more than the number of slots that there are.")
+           "initialised, slot is more than the number of slots that there are, or it is taken.")
       .def("reset", &WrenchDistribution::reset, bp::arg("self"),
            "Forgets contacts, slots, and the answer; weights and settings stay.")
       .def("clear", &WrenchDistribution::clear, bp::arg("self"),

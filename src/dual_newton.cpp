@@ -511,6 +511,7 @@ DistributionStatus DualNewton::finish() {
   if (!isReached(closest, kMissing) || !provesItself() || !isFinite())
     return DistributionStatus::NumericalFailure;
   for (const std::size_t slot : active_) blocks_[slot].last = blocks_[slot].state;
+  finished_ = true;
   return reached ? DistributionStatus::Solved : DistributionStatus::Relaxed;
 }
 
@@ -662,18 +663,19 @@ DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const
     });
   }
 
-  const DistributionStatus status =
-      search(warm_start && last_status_ != DistributionStatus::NumericalFailure);
-  last_status_ = status;
+  const DistributionStatus status = search(warm_start && has_answer_);
+  has_answer_ = status != DistributionStatus::NumericalFailure;
   return status;
 }
 
 DistributionStatus DualNewton::search(bool from_last_answer) {
+  const bool was_finished = finished_;
+  finished_ = false;
   bool reached = false;
-  if (from_last_answer && begin(true)) {
+  if (from_last_answer && (begin(true) || was_finished)) {
     reached = stepFreely(kFreeStepsFromLast);
-    if (!reached && last_status_ == DistributionStatus::Relaxed && iterations_ == 1) {
-      // If this wrench is out of reach, too, the state leads to the answer.
+    if (!reached && was_finished && iterations_ == 1) {
+      // The state of the last answer may lead to this one as it led to that.
       const DistributionStatus status = finish();
       if (status != DistributionStatus::NumericalFailure) return status;
     }

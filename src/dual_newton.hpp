@@ -171,8 +171,9 @@ class DualNewton {
   std::vector<Block> blocks_;        // by slot
   std::vector<std::size_t> active_;  // slots
   bool recognised_ = false;          // whether all active cones are boxes
-  DistributionStatus last_status_ = DistributionStatus::NumericalFailure;  // of the last solve()
-  double largest_weight_ = 0.;                                             // of the active contacts
+  bool has_answer_ = false;          // whether the last solve() had one
+  bool finished_ = false;            // and whether by finish()
+  double largest_weight_ = 0.;       // of the active contacts
   Vector6 weights_ = Vector6::Ones(), target_ = Vector6::Zero();
   Vector6 multipliers_ = Vector6::Zero(), achieved_ = Vector6::Zero();
   Vector6 missing_ = Vector6::Zero();  // of the closest wrench

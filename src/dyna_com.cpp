@@ -220,6 +220,7 @@ void DynaCoM::addContact(const std::shared_ptr<ContactBase>& contact, const std:
   // Whatever index the contact holds may be another model's.
   const pinocchio::FrameIndex frame_id = findFrame(model_, contact->getFrameName(), name);
   const std::size_t slot = findFreeSlot();
+  distribution_.clear();  // the slot may be that of a contact that was removed
   distribution_.reserve(*contact, slot);
   contacts_.emplace_back(name, contact, slot);
   contact->setFrameID(frame_id);

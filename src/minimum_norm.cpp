@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "minimum_norm.hpp"
 
+#include <Eigen/Householder>
 #include <Eigen/Jacobi>
-#include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <utility>
 
 namespace dynacom::internal {
 
@@ -122,21 +124,10 @@ void MinimumNorm<Scalar>::startWithEqualities(const MatrixRef& E, const VectorRe
   complete_ = false;
 
   q_ = equalities_ = 0;
-  if (E.cols() > 0) {  // Eigen's decomposition wants one
-    reflectors_ = E;
-    using Reflectors = typename decltype(reflectors_)::PlainObject;
-    Eigen::ColPivHouseholderQR<Eigen::Ref<Reflectors>> qr(reflectors_);  // in place
-    // Eigen's threshold is relative to the largest pivot, which may be nothing but rounding.
-    qr.setThreshold(kDependentEquality<Scalar> /
-                    std::max(qr.maxPivot(), kDependentEquality<Scalar>));
-    q_ = equalities_ = qr.rank();
+  if (E.cols() > 0) {
+    decompose(E);
     R_.topLeftCorner(q_, q_) = reflectors_.topLeftCorner(q_, q_);
-    for (Eigen::Index k = 0; k < q_; ++k) {
-      const auto position = static_cast<std::size_t>(k);
-      coefficients_[position] = qr.hCoeffs()[k];
-      permutation_[position] = qr.colsPermutation().indices()[k];
-      rhs_[k] = d[permutation_[position]];
-    }
+    for (Eigen::Index k = 0; k < q_; ++k) rhs_[k] = d[permutation_[static_cast<std::size_t>(k)]];
   }
 
   // As computeSolution(), but without J.
@@ -147,6 +138,36 @@ void MinimumNorm<Scalar>::startWithEqualities(const MatrixRef& E, const VectorRe
   u_.head(q_) = -x_.head(q_);
   R_.topLeftCorner(q_, q_).template triangularView<Eigen::Upper>().solveInPlace(u_.head(q_));
   applyQ(x_);
+}
+
+// Householder's decomposition, at each step of the column of which the most is left: Eigen's own
+// allocates. Counts the columns that do not follow from others.
+template <class Scalar>
+void MinimumNorm<Scalar>::decompose(const MatrixRef& E) {
+  reflectors_ = E;
+  const Eigen::Index p = E.cols();
+  for (Eigen::Index k = 0; k < p; ++k) permutation_[static_cast<std::size_t>(k)] = k;
+  for (Eigen::Index k = 0; k < std::min(E.rows(), p); ++k) {
+    const auto position = static_cast<std::size_t>(k);
+    const Eigen::Index below = E.rows() - k - 1;
+    Eigen::Index most = 0;
+    reflectors_.bottomRightCorner(below + 1, p - k).colwise().squaredNorm().maxCoeff(&most);
+    reflectors_.col(k).swap(reflectors_.col(k + most));
+    std::swap(permutation_[position], permutation_[static_cast<std::size_t>(k + most)]);
+
+    Scalar pivot = 0;
+    reflectors_.col(k).tail(below + 1).makeHouseholderInPlace(coefficients_[position], pivot);
+    reflectors_(k, k) = pivot;
+    const auto reflector = reflectors_.col(k).tail(below);
+    for (Eigen::Index j = k + 1; j < p; ++j) {
+      auto column = reflectors_.col(j).tail(below);
+      const Scalar product = coefficients_[position] * (reflectors_(k, j) + reflector.dot(column));
+      reflectors_(k, j) -= product;
+      column -= product * reflector;
+    }
+    if (std::abs(pivot) > kDependentEquality<Scalar>) ++q_;
+  }
+  equalities_ = q_;
 }
 
 // Computes J, which problems without active inequalities never need.

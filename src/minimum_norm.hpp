@@ -61,6 +61,7 @@ class MinimumNorm {
 
  private:
   void startWithEqualities(const MatrixRef& E, const VectorRef& d);
+  void decompose(const MatrixRef& E);
   void completeBasis();
   Status activateViolated(const MatrixRef& G, const VectorRef& h, Scalar tolerance,
                           Scalar dependent, int maximal_iterations);

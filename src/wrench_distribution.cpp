@@ -200,11 +200,12 @@ struct WrenchDistribution::Workspace {
     Eigen::VectorXd weights;
     std::uint64_t revision = 0;  // of the contact, if it was one
     NewtonEuler NE;
-    bool changed = true;      // whether the last solve() knew other inequalities and weights
-    bool moved = false;       // whether it knew another NE
-    std::size_t problem = 0;  // the last that it was added to
-    bool in_result = false;   // whether it was part of the last solve()
-    Contact parked;           // its share of the result while it was not
+    bool changed = true;           // whether the last solve() knew other inequalities and weights
+    bool moved = false;            // whether it knew another NE
+    std::size_t problem = 0;       // the last that it was added to
+    Contact parked;                // its share of the result while it is not part of that
+    Contact spare;                 // storage for another size
+    Eigen::VectorXd former_force;  // of the answer before
 
     Eigen::Index rows() const { return unilaterality.rows() + friction.rows(); }
   };
@@ -337,7 +338,8 @@ void WrenchDistribution::Workspace::describe(Slot& slot, const MatrixRef& unilat
   slot.changed = true;
   if (same_sizes) return;
   slot.NE.resize(6, cols);
-  if (!slot.in_result) resize(slot.parked, rows, cols);
+  resize(slot.spare, rows, cols);
+  slot.former_force.setZero(cols);
   reserve();
 }
 
@@ -360,7 +362,9 @@ void WrenchDistribution::Workspace::reserve() {
 
 void WrenchDistribution::reserve(const ContactBase& contact, std::size_t slot) {
   requireInitialised(contact);
-  work_->describe(work_->findSlot(slot), contact);
+  Workspace::Slot& found = work_->findSlot(slot);
+  if (found.problem == work_->problem) throwInvalid("slot ", slot, " is taken already");
+  work_->describe(found, contact);
 }
 
 void WrenchDistribution::add(const ContactBase& contact) { add(contact, work_->added.size()); }
@@ -401,7 +405,8 @@ void WrenchDistribution::Workspace::takeProblem() {
     Slot& slot = slots[solved[k]];
     Contact& contact = result.contacts[k];
     if (slot.changed) {
-      resize(contact, slot.rows(), slot.weights.size());
+      if (contact.A.rows() != slot.rows() || contact.A.cols() != slot.weights.size())
+        std::swap(slot.spare, contact);
       contact.A.topRows(slot.unilaterality.rows()) = slot.unilaterality;
       contact.A.bottomRows(slot.friction.rows()) = slot.friction;
       contact.weights = slot.weights;
@@ -418,17 +423,14 @@ void WrenchDistribution::Workspace::takeProblem() {
 
 // Puts away the shares of the contacts that took part, and gets those of the ones that do now.
 void WrenchDistribution::Workspace::rearrange() {
-  const auto exchange = [&](bool in_result) {
-    for (std::size_t k = 0; k < solved.size(); ++k) {
-      Slot& slot = slots[solved[k]];
-      std::swap(slot.parked, result.contacts[k]);
-      slot.in_result = in_result;
-    }
+  const auto exchange = [&] {
+    for (std::size_t k = 0; k < solved.size(); ++k)
+      std::swap(slots[solved[k]].parked, result.contacts[k]);
   };
-  exchange(false);
+  exchange();
   solved = added;
   result.contacts.resize(solved.size());
-  exchange(true);
+  exchange();
 }
 
 // Few problems need more digits than double has: those where contacts are nearly parallel, and
@@ -446,6 +448,8 @@ bool WrenchDistribution::Workspace::distribute() {
     result.status = DistributionStatus::InvalidInput;
     return false;
   }
+  for (std::size_t k = 0; k < solved.size(); ++k)
+    slots[solved[k]].former_force = result.contacts[k].force;
   const bool answered = distributeBy(solver);
   const bool proved = answered && result.isOptimal(kProof);
   if (proved && !solver.hasFewDigits()) return true;
@@ -453,7 +457,12 @@ bool WrenchDistribution::Workspace::distribute() {
   const bool answered_accurately = distributeBy(accurate_solver);
   if (answered_accurately && (!proved || result.isOptimal(kProof))) return true;
   // An answer without proof is one if there is none better, but not if there was no time for it.
-  if (result.iterations >= maximal_iterations) return false;
+  if (result.iterations >= maximal_iterations) {
+    for (std::size_t k = 0; k < solved.size(); ++k)
+      result.contacts[k].force = slots[solved[k]].former_force;
+    result.status = DistributionStatus::NumericalFailure;
+    return false;
+  }
   if (answered_accurately) return distributeBy(solver);
   result.status = status;
   return answered;

@@ -226,7 +226,8 @@ BOOST_AUTO_TEST_CASE(the_answer_is_that_of_the_other_solver) {
     other = mine;
 
     DualNewton newton = newtonOf(mine.contacts);
-    const DistributionStatus status = newton.solve(mine.contacts, wrench, weights, true, kEnough);
+    const DistributionStatus status =
+        newton.solve(mine.contacts, weights.cwiseProduct(wrench), weights, true, kEnough);
     if (status == DistributionStatus::NumericalFailure) {
       ++left;
       continue;
@@ -311,21 +312,25 @@ BOOST_AUTO_TEST_CASE(from_the_state_of_an_answer_one_step_leads_to_it_again) {
     const Vector6 weights = random.coin() ? Vector6::Ones() : Vector6(random.vector(6, 0.5, 2.));
     const Vector6 wrench = randomWrench(random, weights);
     DualNewton newton = newtonOf(first.contacts);
-    const DistributionStatus status = newton.solve(first.contacts, wrench, weights, true, kEnough);
+    const DistributionStatus status =
+        newton.solve(first.contacts, weights.cwiseProduct(wrench), weights, true, kEnough);
     if (status == DistributionStatus::NumericalFailure) continue;
     ++answers;
     const int iterations = newton.iterations();
     newton.writeAnswer(first, 1., 1.);
     DistributionResult again = first;
-    BOOST_TEST(newton.solve(again.contacts, wrench, weights, true, kEnough) == status);
+    BOOST_TEST(newton.solve(again.contacts, weights.cwiseProduct(wrench), weights, true, kEnough) ==
+               status);
     newton.writeAnswer(again, 1., 1.);
     BOOST_TEST(newton.iterations() == 1);
     BOOST_TEST(close(again.forces(), first.forces(), 1e-10));
     // A larger wrench of the same kind wants the same state.
-    BOOST_TEST(newton.solve(again.contacts, 1.3 * wrench, weights, true, kEnough) == status);
+    BOOST_TEST(newton.solve(again.contacts, 1.3 * weights.cwiseProduct(wrench), weights, true,
+                            kEnough) == status);
     BOOST_TEST(newton.iterations() == 1);
     // Without, it is as if nothing had been before: the same bits.
-    BOOST_TEST(newton.solve(again.contacts, wrench, weights, false, kEnough) == status);
+    BOOST_TEST(newton.solve(again.contacts, weights.cwiseProduct(wrench), weights, false,
+                            kEnough) == status);
     newton.writeAnswer(again, 1., 1.);
     BOOST_TEST(newton.iterations() == iterations);
     BOOST_TEST(again.forces() == first.forces());
@@ -344,7 +349,7 @@ BOOST_AUTO_TEST_CASE(a_state_stays_with_its_slot) {
     const Vector6 weights = Vector6::Ones(), wrench = randomWrench(random, weights);
     DualNewton newton = newtonOf(result.contacts);
     const auto solve = [&](const Vector6& wrench) {
-      return newton.solve(result.contacts, wrench, weights, true, kEnough);
+      return newton.solve(result.contacts, weights.cwiseProduct(wrench), weights, true, kEnough);
     };
     const DistributionStatus status = solve(wrench);
     if (status == DistributionStatus::NumericalFailure) continue;
@@ -404,7 +409,7 @@ BOOST_AUTO_TEST_CASE(no_more_iterations_are_taken_than_are_allowed) {
     TwoStageSolver<double> solver;
     solver.setProblem(result.contacts, weights);
     const DistributionStatus status =
-        newton.solve(result.contacts, wrench, weights, false, kEnough);
+        newton.solve(result.contacts, weights.cwiseProduct(wrench), weights, false, kEnough);
     const int iterations = newton.iterations();
     newton.writeAnswer(result, 1., 1.);
     const DistributionStatus robust_status = solver.solve(wrench, kEnough);
@@ -412,7 +417,7 @@ BOOST_AUTO_TEST_CASE(no_more_iterations_are_taken_than_are_allowed) {
     BOOST_TEST(robust_iterations > 0);
     for (int limit = 1; limit <= 40; ++limit) {
       const DistributionStatus by_newton =
-          newton.solve(limited.contacts, wrench, weights, false, limit);
+          newton.solve(limited.contacts, weights.cwiseProduct(wrench), weights, false, limit);
       BOOST_TEST(newton.iterations() <= limit);
       if (by_newton != DistributionStatus::NumericalFailure) {
         ++answered;

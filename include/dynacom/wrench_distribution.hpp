@@ -150,7 +150,8 @@ class DYNACOM_EXPORT WrenchDistribution {
   /// Gets a slot's storage ready for a contact, so that a problem with it allocates nothing,
   /// whichever of the other slots take part.
   /// @param slot  at most the number of slots so far: that of the first new one
-  /// @throws std::invalid_argument if the contact was never initialised, or the slot is beyond
+  /// @throws std::invalid_argument if the contact was never initialised, or the slot is beyond that
+  ///         or taken by what was added since clear()
   void reserve(const ContactBase& contact, std::size_t slot);
 
   /// Forgets contacts, slots, and the answer; weights and settings stay.
