@@ -672,7 +672,8 @@ DistributionStatus DualNewton::search(bool from_last_answer) {
   const bool was_finished = finished_;
   finished_ = false;
   bool reached = false;
-  if (from_last_answer && (begin(true) || was_finished)) {
+  const bool is_bound = from_last_answer && begin(true);
+  if (is_bound || (from_last_answer && was_finished)) {
     reached = stepFreely(kFreeStepsFromLast);
     if (!reached && was_finished && iterations_ == 1) {
       // The state of the last answer may lead to this one as it led to that.
@@ -681,7 +682,7 @@ DistributionStatus DualNewton::search(bool from_last_answer) {
     }
   }
   if (!reached) {
-    begin(false);
+    if (!from_last_answer || iterations_ > 0) begin(false);
     reached = stepFreely(kFreeSteps);
   }
   if (reached) {

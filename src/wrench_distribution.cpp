@@ -457,15 +457,16 @@ bool WrenchDistribution::Workspace::distribute() {
   const bool answered_accurately = distributeBy(accurate_solver);
   if (answered_accurately && (!proved || result.isOptimal(kProof))) return true;
   // An answer without proof is one if there is none better, but not if there was no time for it.
-  if (result.iterations >= maximal_iterations) {
-    for (std::size_t k = 0; k < solved.size(); ++k)
-      result.contacts[k].force = slots[solved[k]].former_force;
-    result.status = DistributionStatus::NumericalFailure;
-    return false;
+  const bool had_time = result.iterations < maximal_iterations;
+  if (had_time && !answered_accurately) {
+    result.status = status;
+    return answered;
   }
-  if (answered_accurately) return distributeBy(solver);
-  result.status = status;
-  return answered;
+  if (had_time && distributeBy(solver)) return true;
+  result.status = DistributionStatus::NumericalFailure;
+  for (std::size_t k = 0; k < solved.size(); ++k)
+    result.contacts[k].force = slots[solved[k]].former_force;
+  return false;
 }
 
 template <class Scalar>

@@ -2039,7 +2039,7 @@ def test_maximal_iterations(robot):
     corner = [settings.mu, settings.mu, 1, settings.half_width, settings.half_length, settings.gu]
     hard = contacts[0].ne_A() @ np.multiply(100.0, corner) + contacts[1].ne_A() @ np.eye(6)[2]
 
-    assert robot.getMaximalIterations() == dynacom.WrenchDistribution.kMaximalIterations == 10000
+    assert robot.getMaximalIterations() == dynacom.WrenchDistribution.kMaximalIterations == 100_000
     robot.setWarmStart(False)
     robot.setMaximalIterations(1)
     for _ in range(2):

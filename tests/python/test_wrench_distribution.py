@@ -1141,7 +1141,7 @@ def test_no_iterations_are_enough_where_none_are_needed():
 @pytest.mark.parametrize("number", [0, -1])
 def test_maximal_iterations_out_of_range(number):
     distribution, _, wrench = ready()
-    assert distribution.getMaximalIterations() == WrenchDistribution.kMaximalIterations == 10000
+    assert distribution.getMaximalIterations() == WrenchDistribution.kMaximalIterations == 100_000
     distribution.setMaximalIterations(7)
     with pytest.raises(ValueError, match=f"^maximalIterations must be > 0, got {number}$"):
         distribution.setMaximalIterations(number)
