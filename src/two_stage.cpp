@@ -108,7 +108,7 @@ void TwoStageSolver<Scalar>::resize() {
   face_.resize(n_, n_);
   R_.resize(n_, n_);
   held_.resize(n_);
-  active_.resize(m_);
+  active_.setConstant(m_, false);
 }
 
 // Fills E and G from the scales. A slack is a variable more for each column of E, with this factor.
