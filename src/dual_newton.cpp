@@ -675,7 +675,7 @@ DistributionStatus DualNewton::search(bool from_last_answer) {
   const bool is_bound = from_last_answer && begin(true);
   if (is_bound || (from_last_answer && was_finished)) {
     reached = stepFreely(kFreeStepsFromLast);
-    if (!reached && was_finished && iterations_ == 1) {
+    if (!reached && was_finished && iterations_ == 1 && !hasFullRank()) {
       // The state of the last answer may lead to this one as it led to that.
       const DistributionStatus status = finish();
       if (status != DistributionStatus::NumericalFailure) return status;
