@@ -47,9 +47,9 @@ int main(int argc, char** argv) {
 
     pinocchio::computeCentroidalMomentumTimeVariation(model, data, q, v, a);
     talos.computeDynamics(data);
-    // Solved; Relaxed where it is out of reach, and then the forces are the best that there are, and
-    // what they really do to the robot is in getFeasibleACoM(); else there is no answer, and the
-    // forces are those of the last one: a few ticks of that are for the controller to bridge.
+    // Solved; Relaxed where it is out of reach, and then the forces are the best that there are,
+    // and what they really do to the robot is in getFeasibleACoM(); else there is no answer, and
+    // the forces are those of the last one: a few ticks of that are for the controller to bridge.
     const dynacom::DistributionStatus status = talos.distributeForce(
         talos.getGroundCoMForce(), talos.getGroundCoMTorque(), talos.getCoM());
     if (tick % 100 == 50)
