@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""How a motion is analysed: settings with their defaults, from a file and from the command line.
+
+A settings file is YAML; what it does not name stays at its default::
+
+    cutoff: 6.0           # of the filter [Hz]
+    omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
+    flat: true            # the ground is flat and horizontal: see the CoP
+    detection:            # DetectionSettings, field by field
+      height: 0.015
+    verdict:              # VerdictSettings: a limit, and the part of the frames that may exceed it
+      residual_force: {limit: 0.1, allowed_share: 0.02}
+      near_ground: 0.06
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from dynacom.dynacom_pywrap import DetectionSettings, FaultLimit, VerdictSettings
+from dynacom.errors import DynacomError
+
+
+@dataclass
+class AnalysisOptions:
+    """How a motion is analysed."""
+
+    #: Of the filter where velocities and accelerations are computed [Hz]; None for no filter.
+    cutoff: float | None = 6.0
+    #: Of virtual repellent point and divergent component of motion [rad/s]; 0 stands for
+    #: sqrt(g / mean height of the CoM above the ground).
+    omega: float = 0.0
+    #: Whether the centre of pressure is that of flat horizontal ground.
+    flat: bool = True
+    detection: DetectionSettings = field(default_factory=DetectionSettings)
+    verdict: VerdictSettings = field(default_factory=VerdictSettings)
+
+    def update(self, values: Any, where: str) -> None:
+        """Changes some of the settings.
+
+        Args:
+            values: a mapping as in a settings file.
+            where: what the message calls it.
+
+        Raises:
+            DynacomError: a name is none of a setting, or a value none that it can have.
+        """
+        _update(self, values, where)
+        try:
+            self.detection.validate()
+            self.verdict.validate()
+        except ValueError as error:
+            raise DynacomError(f"{where}: {error}") from error
+
+    def update_from_file(self, path: str | Path) -> None:
+        """Changes the settings that a file names.
+
+        Raises:
+            DynacomError: the file cannot be read, and as :meth:`update`.
+        """
+        try:
+            content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise DynacomError(f"{path}: cannot be read ({error.strerror})") from error
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise DynacomError(f"{path}: must be YAML ({error})") from error
+        self.update({} if content is None else content, str(path))
+
+    def update_from_texts(self, texts: Iterable[str]) -> None:
+        """Changes settings by texts like ``verdict.residual_force.limit=0.2``.
+
+        Raises:
+            DynacomError: a text is none of that form, and as :meth:`update`.
+        """
+        for text in texts:
+            path, equals, value = text.partition("=")
+            try:
+                content = yaml.safe_load(value)
+            except yaml.YAMLError:
+                content = value
+            if not equals:
+                raise DynacomError(f"setting must be NAME=VALUE, got '{text}'")
+            for name in reversed(path.split(".")):
+                content = {name: content}
+            self.update(content, f"setting '{text}'")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The settings, as a settings file would hold them."""
+        return _to_dict(self)
+
+
+_GROUPS = (AnalysisOptions, DetectionSettings, VerdictSettings, FaultLimit)
+
+
+def _names(group: Any) -> list[str]:
+    if isinstance(group, AnalysisOptions):
+        return list(AnalysisOptions.__dataclass_fields__)
+    properties = vars(type(group)).items()
+    return [name for name, value in properties if isinstance(value, property)]
+
+
+def _to_dict(group: Any) -> dict[str, Any]:
+    values = {name: getattr(group, name) for name in _names(group)}
+    return {
+        name: _to_dict(value) if isinstance(value, _GROUPS) else value
+        for name, value in values.items()
+    }
+
+
+def _update(group: Any, values: Any, where: str) -> None:
+    names = _names(group)
+    if not isinstance(values, dict):
+        raise DynacomError(f"{where}: must be a mapping with {', '.join(names)}, got {values!r}")
+    for name, value in values.items():
+        if name not in names:
+            raise DynacomError(f"{where}: unknown setting {name!r}, expected {', '.join(names)}")
+        now = getattr(group, name)
+        if isinstance(now, _GROUPS):
+            _update(now, value, f"{where}: {name}")
+            setattr(group, name, now)
+        elif isinstance(now, bool):
+            if not isinstance(value, bool):
+                raise DynacomError(f"{where}: {name} must be true or false, got {value!r}")
+            setattr(group, name, value)
+        elif value is None and name == "cutoff":
+            setattr(group, name, None)
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            setattr(group, name, float(value))
+        else:
+            raise DynacomError(f"{where}: {name} must be a number, got {value!r}")

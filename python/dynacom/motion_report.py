@@ -1,0 +1,586 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""What a motion asks of the ground, frame by frame and as a whole."""
+
+import csv
+import json
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dynacom.analysis_options import AnalysisOptions
+from dynacom.dynacom_pywrap import (
+    ContactMotion,
+    ContactSchedule,
+    DynaCoM,
+    Motion,
+    MotionAnalysis,
+    MotionVerdict,
+    analyzeMotion,
+    compareDerivatives,
+    computeContactMotions,
+    detectContacts,
+    differentiate,
+    estimateGround,
+    filterConfigurations,
+    judgeMotion,
+    kMaximalCutoff,
+)
+from dynacom.errors import DynacomError
+from dynacom.motion_file import Clip, read_motion
+from dynacom.results_folder import results_folder
+from dynacom.robots import Robot, load_robot
+from dynacom.schedule_file import read_schedule, write_schedule
+
+if TYPE_CHECKING:
+    import pandas
+
+_XYZ = ("_x", "_y", "_z")
+_XY = ("_x", "_y")
+_WRENCH = tuple(f"_{part}{axis}" for part in ("force", "torque") for axis in _XYZ)
+_WRENCH_UNITS = ("N", "N", "N", "N m", "N m", "N m")
+
+# Of the table: array's name, what its columns' names end with, their units. docs/columns.md says
+# what they are.
+_FRAME_COLUMNS = (
+    ("time", ("",), "s"),
+    ("com", _XYZ, "m"),
+    ("vcom", _XYZ, "m/s"),
+    ("acom", _XYZ, "m/s^2"),
+    ("am", _XYZ, "kg m^2/s"),
+    ("dam", _XYZ, "N m"),
+    ("ground_force", _XYZ, "N"),
+    ("ground_torque", _XYZ, "N m"),
+    ("cop", _XY, "m"),
+    ("vrp", _XY, "m"),
+    ("dcm", _XY, "m"),
+    ("nl", _XY, "m"),
+    ("status", ("",), ""),
+    ("residual", _WRENCH, _WRENCH_UNITS),
+    ("feasible_acom", _XYZ, "m/s^2"),
+    ("feasible_dam", _XYZ, "N m"),
+)
+_CONTACT_COLUMNS = (
+    ("active", ("",), ""),
+    ("force", _XYZ, "N"),
+    ("torque", _XYZ, "N m"),
+    ("cop", _XY, "m"),
+    ("friction_usage", ("",), ""),
+    ("yaw_usage", ("",), ""),
+    ("cop_margin", ("",), "m"),
+    ("position", _XYZ, "m"),
+    ("rotation", ("_x", "_y", "_z", "_w"), ""),
+    ("height", ("",), "m"),
+    ("speed", ("",), "m/s"),
+)
+# Where the file says what the contacts felt.
+_MEASURED_COLUMNS = (("measured_force", _XYZ, "N"), ("measured_torque", _XYZ, "N m"))
+
+# How far derivatives from a file may be off, as parts of them, to be used: integrators differ by
+# more than rounding, and a landing is a step in velocity.
+_VELOCITY_MISMATCH = 0.05
+_ACCELERATION_MISMATCH = 0.2
+# By what part of itself a step of time may differ where the frame rate is even.
+_EVEN = 0.02
+
+_FAULTS = {
+    "residual_force": ("m g", "the contacts cannot give the force"),
+    "residual_torque": ("m g m", "the contacts cannot give the moment"),
+    "flight_with_support_needed": ("m g", "no contact is active, but the motion needs support"),
+    "contact_missing": ("m g", "a contact just above the ground would have to push"),
+    "ground_penetration": ("m", "a contact is below the ground"),
+    "foot_sliding": ("m/s", "an active contact slides"),
+    "discontinuity": ("m or rad", "the motion jumps"),
+    "quaternion": ("of the norm", "the root's quaternions are not of norm 1"),
+}
+
+
+@dataclass(frozen=True)
+class MotionReport:
+    """What was found of a motion.
+
+    Arrays have a row per frame, are in the world's axes unless they say otherwise, and in SI units.
+    """
+
+    clip: Clip
+    robot: Robot
+    options: AnalysisOptions
+    #: As analysed: filtered, where derivatives had to be computed.
+    motion: Motion = field(repr=False)
+    schedule: ContactSchedule = field(repr=False)
+    analysis: MotionAnalysis = field(repr=False)
+    verdict: MotionVerdict
+    #: By name, see docs/columns.md: ``com`` (T, 3), ``contact.left_sole.force`` (T, 3), ...
+    arrays: dict[str, np.ndarray] = field(repr=False)
+    #: What summary.json holds.
+    summary: dict[str, Any] = field(repr=False)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """An array by its name."""
+        return self.arrays[name]
+
+    def columns(self) -> dict[str, tuple[np.ndarray, str]]:
+        """The table of frames, see docs/columns.md: column's name -> ((T,) values, unit)."""
+        columns = {}
+        for name, endings, units in self._layout():
+            array = self.arrays[name]
+            if isinstance(units, str):
+                units = (units,) * len(endings)
+            for index, (ending, unit) in enumerate(zip(endings, units, strict=True)):
+                values = array if array.ndim == 1 else array[:, index]
+                columns[name + ending] = values, unit
+        return columns
+
+    def _layout(self) -> Iterator[tuple[str, tuple[str, ...], Any]]:
+        yield from _FRAME_COLUMNS
+        for contact in self.robot.contacts:
+            for name, endings, units in _CONTACT_COLUMNS + _MEASURED_COLUMNS:
+                if (full := f"contact.{contact}.{name}") in self.arrays:
+                    yield full, endings, units
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """The table of frames, for pandas.
+
+        Raises:
+            DynacomError: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise DynacomError("a data frame needs pandas: pip install pandas") from error
+        return pandas.DataFrame({name: values for name, (values, _) in self.columns().items()})
+
+    def save(self, folder: str | Path, *, csv: bool = False, page: bool = True) -> list[Path]:
+        """Writes frames.parquet, summary.json, schedule.yaml and report.html: all of them or none.
+
+        Files of these names that are there already are replaced, others stay.
+
+        Args:
+            folder: made if it is not there.
+            csv: whether to write frames.csv, too.
+            page: whether to write report.html.
+
+        Returns:
+            The files.
+
+        Raises:
+            DynacomError: the folder cannot be written to, or pyarrow, plotly or viser is not
+                installed.
+        """
+        folder = Path(folder)
+        try:
+            with results_folder(folder) as temporary:
+                self._write_parquet(temporary / "frames.parquet")
+                if csv:
+                    self._write_csv(temporary / "frames.csv")
+                text = json.dumps(_without_nan(self.summary), indent=2, ensure_ascii=False)
+                (temporary / "summary.json").write_text(text + "\n", encoding="utf-8")
+                write_schedule(self.schedule, self.motion.time, temporary / "schedule.yaml")
+                if page:
+                    from dynacom.page import write_page
+
+                    write_page(
+                        temporary / "report.html",
+                        self.robot,
+                        self.motion.q,
+                        self.arrays,
+                        self.summary,
+                    )
+                names = sorted(file.name for file in temporary.iterdir())
+        except OSError as error:
+            raise DynacomError(
+                f"{folder}: cannot be written ({error.strerror or error})"
+            ) from error
+        return [folder / name for name in names]
+
+    def _write_parquet(self, path: Path) -> None:
+        try:
+            import pyarrow
+            import pyarrow.parquet
+        except ImportError as error:
+            raise DynacomError(
+                "frames.parquet needs pyarrow: pip install dynacom[motion]"
+            ) from error
+        fields, arrays = [], []
+        for name, (values, unit) in self.columns().items():
+            array = pyarrow.array(values.tolist() if values.dtype.kind == "U" else values)
+            fields.append(pyarrow.field(name, array.type, metadata={"unit": unit}))
+            arrays.append(array)
+        metadata = {"clip": self.summary["clip"], "robot": self.robot.name}
+        table = pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields, metadata))
+        pyarrow.parquet.write_table(table, path)
+
+    def _write_csv(self, path: Path) -> None:
+        columns = self.columns()
+        cells = [
+            values.astype(int).tolist() if values.dtype.kind == "b" else values.tolist()
+            for values, _ in columns.values()
+        ]
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*cells, strict=True))
+
+
+def analyze(
+    motion: str | Path | Clip,
+    robot: str | Path | Robot,
+    *,
+    fps: float | None = None,
+    quat: str | None = None,
+    trust: bool = False,
+    schedule: str | Path | ContactSchedule | None = None,
+    options: AnalysisOptions | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> MotionReport:
+    """Judges a motion: what the ground must give, what its contacts can, and whether that suffices.
+
+    Where the file's velocities and accelerations do not agree with its configurations, or it has
+    none, they are computed: see ``filterConfigurations`` and ``differentiate``. Contacts are active
+    as `schedule` says, else as the file says, else as ``detectContacts`` finds them.
+
+    Args:
+        motion: a file, see :func:`read_motion`, or what was read from one.
+        robot: a robot, or the name or file of one, see :func:`load_robot`.
+        fps, quat, trust: as in :func:`read_motion`.
+        schedule: a file, see docs/files.md, or a schedule with T frames.
+        options: settings; their defaults by default.
+        progress: called now and then with what part of the work is done.
+
+    Raises:
+        DynacomError: the file cannot be read or is no motion of this robot, see
+            :func:`read_motion`; the schedule is not one for it; the cut-off is not below
+            ``kMaximalCutoff`` of the frame rate, or the frame rate is not even.
+        ValueError: options are out of their ranges.
+    """
+    options = options or AnalysisOptions()
+    if not isinstance(robot, Robot):
+        robot = load_robot(robot)
+    clip = motion
+    if not isinstance(clip, Clip):
+        clip = read_motion(motion, robot, fps=fps, quat=quat, trust=trust)
+    try:
+        return _analyze(clip, robot, schedule, options, progress or (lambda part: None))
+    except ValueError as error:
+        raise DynacomError(f"{clip.path}: {error}") from error
+
+
+@dataclass(frozen=True)
+class _Derived:
+    """A motion with derivatives, and where these come from."""
+
+    motion: Motion
+    #: Of the filter [Hz]; None where there was none.
+    cutoff: float | None
+    text: str
+
+
+def _analyze(
+    clip: Clip,
+    robot: Robot,
+    schedule: str | Path | ContactSchedule | None,
+    options: AnalysisOptions,
+    progress: Callable[[float], None],
+) -> MotionReport:
+    derived = _derive(clip, robot, options.cutoff)
+    dynamics = robot.dynacom()
+    contacts = computeContactMotions(dynamics, derived.motion)
+    ground = estimateGround(contacts, clip.time, options.detection)
+    schedule, schedule_text = _find_schedule(clip, schedule, contacts, ground, options)
+    dynamics.setGroundHeight(float(ground.mean()))
+
+    # The motion itself, and with other cut-offs how much hangs on that.
+    others = _other_cutoffs(clip, derived.cutoff)
+    work = (1 + len(others)) * len(clip.time)
+
+    def judge(motion: Motion, done: int) -> tuple[MotionAnalysis, MotionVerdict]:
+        analysis = analyzeMotion(
+            dynamics,
+            motion,
+            schedule,
+            options.flat,
+            omega=options.omega,
+            progress=lambda frames: progress((done + frames) / work),
+        )
+        moved = contacts if motion is derived.motion else computeContactMotions(dynamics, motion)
+        verdict = judgeMotion(
+            dynamics,
+            motion,
+            clip.q,
+            clip.quaternion_error,
+            moved,
+            ground,
+            analysis,
+            options.verdict,
+        )
+        return analysis, verdict
+
+    analysis, verdict = judge(derived.motion, 0)
+    weight = _weight(dynamics)
+    sensitivity = []
+    if derived.cutoff is not None:
+        sensitivity.append(_residuals(derived.cutoff, analysis, verdict, weight))
+        for number, cutoff in enumerate(others):
+            other = _recompute(clip, robot, cutoff)
+            results = judge(other, (1 + number) * len(clip.time))
+            sensitivity.append(_residuals(cutoff, *results, weight))
+        sensitivity.sort(key=lambda entry: entry["cutoff"])
+
+    arrays = _collect_arrays(clip, analysis, contacts, ground)
+    summary = {
+        "clip": clip.path.name,
+        "robot": robot.name,
+        "mass": dynamics.getMass(),
+        "frames": len(clip.time),
+        "duration": float(clip.time[-1] - clip.time[0]),
+        "frame_rate": _frame_rate(clip.time),
+        "omega": analysis.omega,
+        "verdict": "feasible" if verdict.feasible else "not feasible",
+        "codes": _codes(verdict),
+        "reasons": _reasons(verdict, options, len(clip.time)),
+        "statuses": dict(Counter(status.name for status in analysis.status)),
+        "notes": [*clip.notes, derived.text, schedule_text, _ground_text(robot, ground)],
+        "derivatives": derived.text,
+        "cutoff": derived.cutoff,
+        "cutoff_sensitivity": sensitivity,
+        "ground": dict(zip(robot.contacts, ground.tolist(), strict=True)),
+        "contacts": {c.name: _summarize_contact(c, weight) for c in analysis.contacts},
+        "mean_vertical_force": float(analysis.ground_force[:, 2].mean() / weight),
+        "measured": _compare_forces(clip, analysis),
+        "options": options.to_dict(),
+    }
+    return MotionReport(
+        clip, robot, options, derived.motion, schedule, analysis, verdict, arrays, summary
+    )
+
+
+# Derivatives.
+
+
+def _frame_rate(time: np.ndarray) -> float | None:
+    """Frames per second, where they are evenly spaced [Hz]."""
+    if len(time) < 2:
+        return None
+    steps = np.diff(time)
+    mean = steps.mean()
+    return float(1.0 / mean) if np.abs(steps - mean).max() <= _EVEN * mean else None
+
+
+def _recompute(clip: Clip, robot: Robot, cutoff: float | None) -> Motion:
+    if cutoff is None:
+        return differentiate(robot.model, clip.time, clip.q)
+    q = filterConfigurations(robot.model, clip.q, _frame_rate(clip.time), cutoff)
+    return differentiate(robot.model, clip.time, q)
+
+
+def _derive(clip: Clip, robot: Robot, cutoff: float | None) -> _Derived:
+    reason = "the file has none"
+    if clip.v is not None and clip.a is not None:
+        motion = Motion(clip.time, clip.q, clip.v, clip.a)
+        mismatch = compareDerivatives(robot.model, motion)
+        fits = f"{mismatch.velocity:.1%} and {mismatch.acceleration:.1%}"
+        agree = mismatch.velocity <= _VELOCITY_MISMATCH
+        if agree and mismatch.acceleration <= _ACCELERATION_MISMATCH:
+            text = f"Velocities and accelerations are the file's: they differ by {fits} from its"
+            return _Derived(motion, None, f"{text} positions and velocities.")
+        reason = f"the file's differ by {fits} from its positions and velocities"
+    elif clip.v is not None:
+        reason = "the file has velocities only"
+    rate = _frame_rate(clip.time)
+    if cutoff is not None and rate is None and len(clip.time) > 1:
+        raise DynacomError(
+            f"{clip.path}: times must be evenly spaced to be filtered, got steps from "
+            f"{np.diff(clip.time).min():g} to {np.diff(clip.time).max():g} s"
+        )
+    if rate is None:
+        cutoff = None
+    elif cutoff is not None and not 0.0 < cutoff < kMaximalCutoff * rate:
+        raise DynacomError(
+            f"{clip.path}: cutoff must be > 0 and < {kMaximalCutoff * rate:g} Hz, which is "
+            f"{kMaximalCutoff:g} of the frame rate, got {cutoff:g} Hz"
+        )
+    how = (
+        "without a filter"
+        if cutoff is None
+        else f"after a Butterworth filter of 4th order, forward and backward, at {cutoff:g} Hz"
+    )
+    text = f"Velocities and accelerations are computed from the positions, {how}: {reason}."
+    return _Derived(_recompute(clip, robot, cutoff), cutoff, text)
+
+
+def _other_cutoffs(clip: Clip, cutoff: float | None) -> list[float]:
+    if cutoff is None:
+        return []
+    limit = kMaximalCutoff * _frame_rate(clip.time)
+    return [other for other in (0.5 * cutoff, 2.0 * cutoff) if other < limit]
+
+
+# Contacts.
+
+
+def _find_schedule(
+    clip: Clip,
+    given: str | Path | ContactSchedule | None,
+    contacts: list[ContactMotion],
+    ground: np.ndarray,
+    options: AnalysisOptions,
+) -> tuple[ContactSchedule, str]:
+    if isinstance(given, ContactSchedule):
+        return given, "Contacts are active as the caller says."
+    if given is not None:
+        names = [contact.name for contact in contacts]
+        return read_schedule(given, clip.time, names), f"Contacts are active as {given} says."
+    if clip.schedule is not None:
+        return clip.schedule, "Contacts are active as the file says."
+    found = detectContacts(contacts, clip.time, ground, options.detection)
+    return found, "Contacts are found from height and speed."
+
+
+def _ground_text(robot: Robot, ground: np.ndarray) -> str:
+    heights = ", ".join(
+        f"{name} {height:.3f} m" for name, height in zip(robot.contacts, ground, strict=True)
+    )
+    return f"Height of the ground: {heights}."
+
+
+# Results.
+
+
+def _weight(dynamics: DynaCoM) -> float:
+    """What forces are compared with: m g, of standard gravity where there is none [N]."""
+    return dynamics.getMass() * (-dynamics.getSettings().gravity[2] or 9.81)
+
+
+def _codes(verdict: MotionVerdict) -> list[str]:
+    holding = [code for code, finding in verdict.findings.items() if finding.holds]
+    return holding or ["feasible"]
+
+
+def _reasons(verdict: MotionVerdict, options: AnalysisOptions, frames: int) -> list[dict[str, Any]]:
+    reasons = []
+    for code, finding in verdict.findings.items():
+        unit, text = _FAULTS[code]
+        limit = getattr(options.verdict, code)
+        share = finding.frames / frames
+        if finding.frames:
+            text += (
+                f": more than {limit.limit:g} {unit} in {finding.frames} of {frames} frames, up to "
+                f"{finding.worst:.3g} {unit} at {finding.time:.2f} s"
+            )
+        reasons.append(
+            {
+                "code": code,
+                "holds": finding.holds,
+                "frames": finding.frames,
+                "share": share,
+                "worst": finding.worst,
+                "unit": unit,
+                "time": finding.time,
+                "threshold": limit.limit,
+                "allowed_share": limit.allowed_share,
+                "text": text,
+            }
+        )
+    return reasons
+
+
+def _residuals(
+    cutoff: float, analysis: MotionAnalysis, verdict: MotionVerdict, weight: float
+) -> dict[str, Any]:
+    norms = np.linalg.norm(analysis.residual.reshape(-1, 2, 3), axis=2) / weight
+    relaxed = [status.name == "Relaxed" for status in analysis.status]
+    rms_force, rms_torque = np.sqrt((norms**2).mean(axis=0)).tolist()
+    return {
+        "cutoff": cutoff,
+        "residual_force_rms": rms_force,
+        "residual_torque_rms": rms_torque,
+        "relaxed_share": float(np.mean(relaxed)),
+        "codes": _codes(verdict),
+    }
+
+
+def _collect_arrays(
+    clip: Clip, analysis: MotionAnalysis, contacts: list[ContactMotion], ground: np.ndarray
+) -> dict[str, np.ndarray]:
+    names = [name for name, _, _ in _FRAME_COLUMNS if name != "status"]
+    arrays = {name: getattr(analysis, name) for name in names}
+    arrays["status"] = np.array([status.name for status in analysis.status])
+    for contact, moved, height in zip(analysis.contacts, contacts, ground, strict=True):
+        values = {
+            "active": np.asarray(contact.active, dtype=bool),
+            "force": contact.wrench[:, :3],
+            "torque": contact.wrench[:, 3:],
+            "cop": contact.cop,
+            "friction_usage": contact.friction_usage,
+            "yaw_usage": contact.yaw_usage,
+            "cop_margin": contact.cop_margin,
+            "position": moved.position,
+            "rotation": moved.rotation,
+            "height": moved.height - height,
+            "speed": np.linalg.norm(moved.velocity, axis=1),
+        }
+        if contact.name in clip.forces:
+            measured = clip.forces[contact.name]
+            values["measured_force"] = measured[:, :3]
+            if measured.shape[1] == 6:
+                values["measured_torque"] = measured[:, 3:]
+        arrays |= {f"contact.{contact.name}.{name}": array for name, array in values.items()}
+    return arrays
+
+
+def _summarize_contact(contact: MotionAnalysis.Contact, weight: float) -> dict[str, Any]:
+    active = np.asarray(contact.active, dtype=bool)
+    share = contact.vertical_force / weight
+    usage = contact.friction_usage[np.isfinite(contact.friction_usage)]
+    margin = contact.cop_margin[np.isfinite(contact.cop_margin)]
+    return {
+        "active_share": float(active.mean()),
+        "weight_share": float(share.mean()),
+        "weight_share_while_active": float(share[active].mean()) if active.any() else None,
+        "largest_vertical_force": float(share.max()),
+        "largest_friction_usage": float(usage.max()) if len(usage) else None,
+        "least_cop_margin": float(margin.min()) if len(margin) else None,
+    }
+
+
+def _compare_forces(clip: Clip, analysis: MotionAnalysis) -> dict[str, Any]:
+    """Of each contact whose force the file holds: computed minus measured, by component."""
+    compared = {}
+    for contact in analysis.contacts:
+        if contact.name not in clip.forces:
+            continue
+        measured = clip.forces[contact.name]
+        computed = contact.wrench[:, : measured.shape[1]]
+        known = np.isfinite(measured).all(axis=1)
+        if not known.any():
+            continue
+        difference = (computed - measured)[known]
+        compared[contact.name] = {
+            "bias": difference.mean(axis=0).tolist(),
+            "rms": np.sqrt((difference**2).mean(axis=0)).tolist(),
+            "correlation": [
+                _correlation(a, b)
+                for a, b in zip(computed[known].T, measured[known].T, strict=True)
+            ],
+        }
+    return compared
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float | None:
+    if a.std() == 0.0 or b.std() == 0.0:
+        return None
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def _without_nan(value: Any) -> Any:
+    """The value, with null where JSON has no number."""
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
