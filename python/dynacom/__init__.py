@@ -37,7 +37,7 @@ from dynacom.dynacom_pywrap import (
     readCentroidalState,
 )
 from dynacom.errors import DynacomError, NotReadyError
-from dynacom.motion_file import MotionFile, read_motion
+from dynacom.motion_file import Clip, read_motion
 from dynacom.robots import Robot, load_robot
 
 _compat.add_aliases()
@@ -45,6 +45,7 @@ _compat.add_aliases()
 __all__ = [
     "CentroidalState",
     "CentroidalWrench",
+    "Clip",
     "Contact6D",
     "Contact6DSettings",
     "ContactBase",
@@ -58,7 +59,6 @@ __all__ = [
     "DynacomError",
     "Motion",
     "MotionAnalysis",
-    "MotionFile",
     "NotReadyError",
     "Robot",
     "WrenchDistribution",

@@ -108,9 +108,12 @@ def analyze(
     from dynacom.report import results_folder, summarize, summary_table, write_frames
 
     subject = dynacom.load_robot(robot)
-    frames, schedule, _ = dynacom.read_motion(motion)
-    if schedule is None:
+    clip = dynacom.read_motion(motion, subject)
+    if clip.v is None or clip.a is None:
+        raise DynacomError(f"{motion}: missing velocities and accelerations")
+    if clip.schedule is None:
         raise DynacomError(f"{motion}: missing arrays 'contacts' and 'contact_names'")
+    frames, schedule = dynacom.Motion(clip.time, clip.q, clip.v, clip.a), clip.schedule
 
     dynamics = subject.dynacom()
     dynamics.setGroundHeight(ground_height)

@@ -87,6 +87,12 @@ class Robot:
     model: pin.Model = field(repr=False)
     #: Contact's name -> its settings, in the order of the file.
     contacts: Mapping[str, ContactSettings]
+    #: The file that the model was read from.
+    urdf: Path
+    #: Configuration of joints that a motion does not give, (nq,).
+    default: np.ndarray = field(repr=False)
+    #: Orders of the joints of smaller versions of the robot, for motions that name no joints.
+    joint_layouts: tuple[tuple[str, ...], ...] = ()
 
     def dynacom(self, inactive: Iterable[str] = ()) -> DynaCoM:
         """A new DynaCoM of this robot, which knows all its contacts.
@@ -135,7 +141,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         if entry.placement is not None:
             entry.settings.frame_name = _add_frame(model, frame, entry, file.path)
         contacts[entry.name] = entry.settings
-    return Robot(file.name, model, contacts)
+    return Robot(file.name, model, contacts, _find_urdf(file), pin.neutral(model))
 
 
 def read_robot_file(path: str | Path) -> RobotFile:
