@@ -21,9 +21,11 @@ QUATERNION_NOTED = 1e-5
 #: Vertical component of the root's z axis in the median frame: below the first (53° of inclination)
 #: the robot does not stand, above the second (37°) it does.
 NOT_UPRIGHT, UPRIGHT = 0.6, 0.8
-#: A joint's angle outside its limits [rad]: in the median frame, to be taken for degrees; what they
-#: may be outside once they are radians; and what is noted. Retargeted motions go a little beyond.
-DEGREES_EXCESS, RADIANS_EXCESS, NOTED_EXCESS = 1.0, 0.35, 0.1
+#: Angles are degrees if so many joints are so far outside their limits [rad] in the median frame,
+#: and none is as far as the third number once they are radians.
+DEGREES_SHARE, DEGREES_EXCESS, RADIANS_EXCESS = 0.3, 1.0, 0.35
+#: An angle so far outside its limits is noted [rad]. Retargeted motions go a little beyond.
+NOTED_EXCESS = 0.1
 #: A time step, in median ones.
 HOLE = 3.0
 #: Of the root and of prismatic joints [m/s]: nobody runs faster.
@@ -198,7 +200,7 @@ def check_angles(path: Path, robot: Robot, names: Sequence[str], angles: np.ndar
     name, value = names[limited[column]], angles[frame, column]
     limits = f"{lower[column]:.4g} to {upper[column]:.4g} rad"
     if (
-        np.median(outside.max(axis=1)) > DEGREES_EXCESS
+        np.mean(np.median(outside, axis=0) > DEGREES_EXCESS) >= DEGREES_SHARE
         and excess(np.deg2rad(angles)).max() < RADIANS_EXCESS
     ):
         raise DynacomError(
@@ -206,7 +208,9 @@ def check_angles(path: Path, robot: Robot, names: Sequence[str], angles: np.ndar
             f"frame {frame}"
         )
     if outside[frame, column] > NOTED_EXCESS:
-        return [f"{name} ({limits}) goes beyond its limits: {value:.4g} rad in frame {frame}."]
+        return [
+            f"The joint {name} ({limits}) goes beyond its limits: {value:.4g} rad in frame {frame}."
+        ]
     return []
 
 

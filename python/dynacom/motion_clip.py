@@ -109,8 +109,8 @@ def clip_from_configurations(
     known = joint_names(robot)
     if held := [name for name in known if name not in names]:
         notes.append(
-            f"{len(held)} of {len(known)} joints are not in the file and stay at their default: "
-            f"{brief(held)}."
+            f"The file does not give {len(held)} of {len(known)} joints, which stay at their "
+            f"default: {brief(held)}."
         )
     if error.max() > QUATERNION_NOTED:
         notes.append(
