@@ -301,7 +301,13 @@ def _make_options(
 def _progress() -> Iterator[Callable[[float], None]]:
     """A progress bar on stderr, if that is a terminal: a function that takes the part done."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
 
     console = Console(stderr=True)
     if not console.is_terminal:
