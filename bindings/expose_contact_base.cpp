@@ -54,7 +54,8 @@ void exposeContactBase() {
           "getCorners",
           +[](const ContactBase& self) { return toArray(self.getCorners().transpose()); },
           bp::arg("self"),
-          "Corners of the surface, in its plane and in order around it, (corners, 2) [m]: of points\n"
+          "Corners of the surface, in its plane and in order around it, (corners, 2) [m]: of "
+          "points\n"
           "the origin.")
       .def("uni_rows", &ContactBase::uni_rows, bp::arg("self"), "Rows of uni_A.")
       .def("fri_rows", &ContactBase::fri_rows, bp::arg("self"), "Rows of fri_A.")

@@ -10,6 +10,7 @@ by :func:`load_robot` and :func:`read_motion`; :func:`analyze` judges a motion a
 import pinocchio  # noqa: F401  isort: skip
 
 from dynacom import compat as _compat
+from dynacom.analysis_options import AnalysisOptions
 from dynacom.dynacom_pywrap import (
     CentroidalState,
     CentroidalWrench,
@@ -52,7 +53,6 @@ from dynacom.dynacom_pywrap import (
     kMaximalCutoff,
     readCentroidalState,
 )
-from dynacom.analysis_options import AnalysisOptions
 from dynacom.errors import DynacomError, NotReadyError
 from dynacom.motion_file import Clip, read_motion
 from dynacom.motion_report import MotionReport, analyze

@@ -29,7 +29,8 @@ def summary_table(summary: dict[str, Any]) -> Table:
     for entry in summary["cutoff_sensitivity"]:
         table.add_row(
             f"Residual at {entry['cutoff']:g} Hz",
-            f"{entry['residual_force_rms']:.3g} m g, {entry['residual_torque_rms']:.3g} m g m (RMS)",
+            f"{entry['residual_force_rms']:.3g} m g, "
+            f"{entry['residual_torque_rms']:.3g} m g m (RMS)",
         )
     table.add_section()
     for name, contact in summary["contacts"].items():
