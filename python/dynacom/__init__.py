@@ -38,7 +38,7 @@ from dynacom.dynacom_pywrap import (
 )
 from dynacom.errors import DynacomError, NotReadyError
 from dynacom.motion_file import MotionFile, read_motion
-from dynacom.robots import Robot, load_robot
+from dynacom.robots import Payload, Robot, load_robot, make_robot, parse_payload
 
 _compat.add_aliases()
 
@@ -60,6 +60,7 @@ __all__ = [
     "MotionAnalysis",
     "MotionFile",
     "NotReadyError",
+    "Payload",
     "Robot",
     "WrenchDistribution",
     "WrenchMargin",
@@ -71,6 +72,8 @@ __all__ = [
     "computeGroundWrench",
     "computeVRP",
     "load_robot",
+    "make_robot",
+    "parse_payload",
     "readCentroidalState",
     "read_motion",
 ]
