@@ -685,7 +685,7 @@ def test_g1_has_one_free_flyer(tmp_path):
 
 def test_payload(talos):
     """A point mass, fixed to the frame."""
-    loaded = talos.with_payload("arm_right_7_link", 3.0, [0.1, -0.2, 0.3])
+    loaded = talos.with_payload("gripper_right_base_link", 3.0, [0.1, -0.2, 0.3])
     assert loaded.contacts == talos.contacts
     assert (loaded.name, loaded.urdf) == (talos.name, talos.urdf)
     np.testing.assert_array_equal(loaded.default, talos.default)
@@ -699,7 +699,7 @@ def test_payload(talos):
 
     # Its place and acceleration, of a frame of its own.
     model = talos.model.copy()
-    hand = model.frames[model.getFrameId("arm_right_7_link")]
+    hand = model.frames[model.getFrameId("gripper_right_base_link")]
     place = hand.placement * pin.SE3(np.eye(3), np.array([0.1, -0.2, 0.3]))
     frame = model.addFrame(pin.Frame("load", hand.parentJoint, 0, place, pin.FrameType.OP_FRAME))
     data = model.createData()
