@@ -149,8 +149,6 @@ class Robot:
         if position.shape != (3,) or not np.isfinite(position).all():
             raise DynacomError(f"{where}: position must be 3 finite numbers, got {position}")
         holder = self.model.frames[_find_frame(self.model, frame, where)]
-        if holder.parentJoint == 0:
-            raise DynacomError(f"{where}: frame must move with the robot, got '{frame}'")
         model = self.model.copy()
         load = pin.Inertia(float(mass), position, np.zeros((3, 3)))
         model.appendBodyToJoint(holder.parentJoint, load, holder.placement)
@@ -554,6 +552,8 @@ def _find_frame(model: pin.Model, name: str, where: str) -> int:
             f"{where}: frame must be the name of one frame of the URDF, got '{name}', which "
             f"{len(frames) or 'none'} of them have"
         )
+    if model.frames[frames[0]].parentJoint == 0:
+        raise DynacomError(f"{where}: frame must be the robot's, got the world's, '{name}'")
     return frames[0]
 
 
