@@ -23,7 +23,7 @@ QUATERNION_NOTED = 1e-5
 NOT_UPRIGHT, UPRIGHT = 0.6, 0.8
 #: Angles are degrees if so many joints are so far outside their limits [rad] in the median frame,
 #: and none is as far as the third number once they are radians.
-DEGREES_SHARE, DEGREES_EXCESS, RADIANS_EXCESS = 0.3, 1.0, 0.35
+DEGREES_SHARE, DEGREES_EXCESS, RADIANS_EXCESS = 0.4, 1.0, 0.35
 #: An angle so far outside its limits is noted [rad]. Retargeted motions go a little beyond.
 NOTED_EXCESS = 0.1
 #: A time step, in median ones.
