@@ -30,6 +30,8 @@ LEVER = 0.1
 #: How far a link may be from its body [m]. Revisions of a robot differ by a centimetre; a wrong
 #: order by more in any motion worth the name, else the best one wins.
 TOLERANCE = 0.02
+# Bodies that fit a joint as well as the best one, up to this [m].
+_ALIKE = 1e-3
 # So many frames are looked at, from the first to the last.
 _FRAMES = 40
 
@@ -142,12 +144,20 @@ def find_order(
             f"The joints have no names: by the poses of the bodies their order is {title}{text}.",
             _agreement(error),
         ]
-    radians = np.deg2rad(angles)
-    if any(_mismatch(robot, order, radians, bodies)[0] <= TOLERANCE for order in errors):
+    if any(
+        _mismatch(robot, order, _from_degrees(robot, order, angles), bodies)[0] <= TOLERANCE
+        for order in errors
+    ):
         raise DynacomError(f"{path}: joint_pos must be in radians, got degrees")
     raise _wrong_robot(
         path, robot, f"no order of the joints does; {title} puts {where} {error:.2g} m away"
     )
+
+
+def _from_degrees(robot: Robot, names: Sequence[str], angles: np.ndarray) -> np.ndarray:
+    model = robot.model
+    turns = [is_revolute(model.joints[model.getJointId(name)]) for name in names]
+    return np.where(turns, np.deg2rad(angles), angles)
 
 
 def _agreement(error: float) -> str:
@@ -234,50 +244,63 @@ def _mismatch(
 def _match_columns(robot: Robot, angles: np.ndarray, bodies: BodySample) -> tuple[str, ...] | None:
     """The joint of every column, by the angles that the bodies' poses show.
 
-    Joints are taken from the root on: a joint's child link is the body that stays where the joint
-    is, and turns about its axis only. None where that is not enough to go by: a number of joints
-    other than the robot's, or prismatic ones.
+    Joints are taken from the root on: a joint's link is the body that stays where the joint is,
+    turns about its axis only, and turns as some column says. Where several do, as links do that are
+    fixed to the joint's parent in the same place while another joint is at rest, it is the one that
+    turns most. None where that is not enough to go by: a number of joints other than the robot's,
+    or prismatic ones, or no body that fits.
     """
     model = robot.model
     names = joint_names(robot)
-    if angles.shape[1] != len(names) or len(names) != model.njoints - ROOT_JOINT - 1:
+    count = len(names)
+    if angles.shape[1] != count or count != model.njoints - ROOT_JOINT - 1:
         return None
     if not all(is_revolute(model.joints[model.getJointId(name)]) for name in names):
         return None
     axes = _axes(model)
-    rotation = np.empty((len(bodies.frames), model.njoints, 3, 3))
-    position = np.empty((len(bodies.frames), model.njoints, 3))
-    rotation[:, ROOT_JOINT], position[:, ROOT_JOINT] = (
-        rotations(bodies.root[:, 3:]),
-        bodies.root[:, :3],
-    )
-    shown = np.empty((len(bodies.frames), len(names)))
+    angles = angles[bodies.frames]
+    rotation = {ROOT_JOINT: rotations(bodies.root[:, 3:])}
+    position = {ROOT_JOINT: bodies.root[:, :3]}
+    # Of every joint from every column [rad].
+    differences = np.empty((count, count))
     for joint in range(ROOT_JOINT + 1, model.njoints):
         parent, placement = model.parents[joint], model.jointPlacements[joint]
-        origin = position[:, parent] + rotation[:, parent] @ placement.translation
-        zero = rotation[:, parent] @ placement.rotation
-        # (S, B, 3, 3) and so on: of every body.
+        origin = position[parent] + rotation[parent] @ placement.translation
+        zero = rotation[parent] @ placement.rotation
         turned = np.swapaxes(zero, -1, -2)[:, None] @ bodies.rotation
-        off = np.linalg.norm(bodies.position - origin[:, None], axis=-1)
-        off += LEVER * np.linalg.norm(turned @ axes[joint] - axes[joint], axis=-1)
-        body = int(np.argmin(off.max(axis=0)))
-        position[:, joint], rotation[:, joint] = bodies.position[:, body], bodies.rotation[:, body]
-        x, y, z = axes[joint]
-        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        # The trace of R is 1 + 2 cos, that of cross' R is 2 sin.
-        turned = turned[:, body]
-        shown[:, names.index(model.names[joint])] = np.arctan2(
-            np.einsum("ij,sij->s", cross, turned), np.trace(turned, axis1=1, axis2=2) - 1.0
-        )
+        error = np.linalg.norm(bodies.position - origin[:, None], axis=-1)
+        error += LEVER * np.linalg.norm(turned @ axes[joint] - axes[joint], axis=-1)
+        shown = _turn(turned, axes[joint])
+        difference = np.abs(_wrap(shown[:, :, None] - angles[:, None, :])).max(axis=0)
+        error = error.max(axis=0) + LEVER * difference.min(axis=1)
+        if error.min() > TOLERANCE:
+            return None
+        moves = np.abs(_wrap(shown - shown[0])).max(axis=0)
+        body = int(np.argmax(np.where(error <= error.min() + _ALIKE, moves, -1.0)))
+        position[joint], rotation[joint] = bodies.position[:, body], bodies.rotation[:, body]
+        differences[names.index(model.names[joint])] = difference[body]
 
-    difference = shown[:, :, None] - angles[bodies.frames][:, None, :]
-    difference = np.abs((difference + np.pi) % (2.0 * np.pi) - np.pi).max(axis=0)
     found: dict[int, str] = {}
     # The clearest first: what is alike by chance is taken by then.
-    for joint in np.argsort(difference.min(axis=1)):
-        free = [column for column in range(len(names)) if column not in found]
-        found[free[int(np.argmin(difference[joint, free]))]] = names[joint]
-    return tuple(found[column] for column in range(len(names)))
+    for index in np.argsort(differences.min(axis=1)):
+        free = [column for column in range(count) if column not in found]
+        found[free[int(np.argmin(differences[index, free]))]] = names[index]
+    return tuple(found[column] for column in range(count))
+
+
+def _turn(rotation: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Angles (...) of rotations (..., 3, 3) about an axis."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # Twice the sine and twice the cosine.
+    return np.arctan2(
+        np.einsum("ij,...ij->...", cross, rotation), np.trace(rotation, axis1=-2, axis2=-1) - 1.0
+    )
+
+
+def _wrap(angle: np.ndarray) -> np.ndarray:
+    """The same angle in [-π, π)."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def _axes(model: pin.Model) -> dict[int, np.ndarray]:

@@ -23,7 +23,7 @@ QUATERNION_NOTED = 1e-5
 NOT_UPRIGHT, UPRIGHT = 0.6, 0.8
 #: Angles are degrees if so many joints are so far outside their limits [rad] in the median frame,
 #: and none is as far as the third number once they are radians.
-DEGREES_SHARE, DEGREES_EXCESS, RADIANS_EXCESS = 0.3, 1.0, 0.35
+DEGREES_SHARE, DEGREES_EXCESS, RADIANS_EXCESS = 0.4, 1.0, 0.35
 #: An angle so far outside its limits is noted [rad]. Retargeted motions go a little beyond.
 NOTED_EXCESS = 0.1
 #: A time step, in median ones.
@@ -230,30 +230,32 @@ def check_jumps(path: Path, robot: Robot, time: np.ndarray, q: np.ndarray) -> No
     # Clocks jitter; frames that come early have not moved faster.
     steps = np.maximum(steps, np.median(steps))
 
-    def check(what: str, moved: np.ndarray, limit: float, unit: str) -> None:
-        speed = moved / steps
-        frame = int(np.argmax(speed))
-        if speed[frame] > limit:
-            raise DynacomError(
-                f"{path}: {what} jumps by {moved[frame]:.3g} {unit} between frame {frame} "
-                f"({time[frame]:.6g} s) and the next: {speed[frame]:.3g} {unit}/s, expected at "
-                f"most {limit:g}"
-            )
-
-    check("the root", np.linalg.norm(np.diff(q[:, :3], axis=0), axis=1), LINEAR_SPEED, "m")
     # Two quaternions, whatever their signs, are 2 sin(angle / 4) apart.
     first, second = q[:-1, 3:7], q[1:, 3:7]
     sign = np.where((first * second).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     quarter = np.arcsin(np.minimum(0.5 * np.linalg.norm(sign * second - first, axis=1), 1.0))
-    check("the root's orientation", 4.0 * quarter, TURNING_SPEED, "rad")
     names = joint_names(robot)
-    moved = np.abs(np.diff(joint_angles(robot, q, names), axis=0))
-    for column, name in enumerate(names):
+    moved = [
+        np.linalg.norm(np.diff(q[:, :3], axis=0), axis=1),
+        4.0 * quarter,
+        *np.abs(np.diff(joint_angles(robot, q, names), axis=0)).T,
+    ]
+    limits, units = [LINEAR_SPEED, TURNING_SPEED], ["m", "rad"]
+    for index, name in enumerate(names, 2):
         joint = robot.model.joints[robot.model.getJointId(name)]
-        angle = moved[:, column]
+        turns = is_revolute(joint)
+        limits.append(JOINT_SPEED if turns else LINEAR_SPEED)
+        units.append("rad" if turns else "m")
         if joint.nq == 2:
-            angle = np.minimum(angle, 2.0 * np.pi - angle)
-        if is_revolute(joint):
-            check(name, angle, JOINT_SPEED, "rad")
-        else:
-            check(name, angle, LINEAR_SPEED, "m")
+            moved[index] = np.minimum(moved[index], 2.0 * np.pi - moved[index])
+
+    speed = np.array(moved) / steps
+    excess = speed / np.array(limits)[:, None]
+    index, frame = np.unravel_index(np.argmax(excess), excess.shape)
+    if excess[index, frame] > 1.0:
+        what, unit = ("the root", "the root's orientation", *names)[index], units[index]
+        raise DynacomError(
+            f"{path}: {what} jumps by {moved[index][frame]:.3g} {unit} between frame {frame} "
+            f"({time[frame]:.6g} s) and the next: {speed[index, frame]:.3g} {unit}/s, expected at "
+            f"most {limits[index]:g}"
+        )

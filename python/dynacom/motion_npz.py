@@ -87,8 +87,8 @@ class _Arrays:
             for size, got in zip(shape, array.shape, strict=True)
         ):
             raise DynacomError(
-                f"{self._path}: {name} must have shape ({', '.join(map(str, shape))}), "
-                f"got {array.shape}"
+                f"{self._path}: {name} must have shape ({', '.join(map(str, shape))}"
+                f"{',' if len(shape) == 1 else ''}), got {array.shape}"
             )
         check_finite(self._path, name, array)
         return array
@@ -146,7 +146,7 @@ def _read_plain(path: Path, robot: Robot, arrays: _Arrays, options: Options) -> 
         arrays.numbers(name, frames, model.nv) if name in arrays else None for name in ("v", "a")
     )
     if options.quat is not None:
-        notes.append("q is as in Pinocchio: --quat is not used.")
+        notes.append("The order in q is Pinocchio's: --quat is not used.")
 
     schedule, forces = None, {}
     if any(name in arrays for name in ("contacts", "contact_names", "contact_wrenches")):
@@ -335,28 +335,39 @@ def _read_velocities(
     quaternion: np.ndarray,
     bodies: _Bodies | None,
 ) -> np.ndarray | None:
-    """Velocities (T, nv) of joint_vel and the root's body_lin_vel_w and body_ang_vel_w, if there.
+    """Velocities (T, nv), if there.
+
+    Those of the joints are in joint_vel. Those of the root, linear and angular, in the world's
+    axes, are before them, or are those of its body in body_lin_vel_w and body_ang_vel_w.
 
     Args:
         names: of the joints in these columns, among so many joints.
         quaternion: of the root, (T, 4), x y z w, of norm 1.
     """
-    wanted = ("joint_vel", "body_lin_vel_w", "body_ang_vel_w")
-    if bodies is None or not all(name in arrays for name in wanted):
+    if "joint_vel" not in arrays:
         return None
-    frames, number = bodies.position.shape[:2]
+    frames = len(quaternion)
     joint_vel = arrays.numbers("joint_vel", frames, "n")
-    # Where joint_pos has a pose of 7 numbers, joint_vel may have a velocity of 6.
-    if joint_vel.shape[1] not in (count, 6 + count):
+    if joint_vel.shape[1] == 6 + count:
+        root, joint_vel = np.split(joint_vel, [6], axis=1)
+    elif joint_vel.shape[1] != count:
         raise DynacomError(
             f"{path}: joint_vel must have {count} or 6 + {count} columns, got {joint_vel.shape[1]}"
         )
-    joint_vel = joint_vel[:, -count:][:, columns]
+    elif bodies and "body_lin_vel_w" in arrays and "body_ang_vel_w" in arrays:
+        shape = bodies.position.shape
+        root = np.hstack(
+            [
+                arrays.numbers(name, *shape)[:, bodies.root]
+                for name in ("body_lin_vel_w", "body_ang_vel_w")
+            ]
+        )
+    else:
+        return None
     v = np.zeros((frames, robot.model.nv))
     to_local = np.swapaxes(rotations(quaternion), 1, 2)
-    for start, name in ((0, "body_lin_vel_w"), (3, "body_ang_vel_w")):
-        world = arrays.numbers(name, frames, number, 3)[:, bodies.root]
-        v[:, start : start + 3] = np.einsum("tij,tj->ti", to_local, world)
-    for name, values in zip(names, joint_vel.T, strict=True):
+    v[:, :3] = np.einsum("tij,tj->ti", to_local, root[:, :3])
+    v[:, 3:6] = np.einsum("tij,tj->ti", to_local, root[:, 3:])
+    for name, values in zip(names, joint_vel[:, columns].T, strict=True):
         v[:, robot.model.joints[robot.model.getJointId(name)].idx_v] = values
     return v

@@ -25,7 +25,7 @@ def read_parquet(path: Path, robot: Robot, options: Options) -> Clip:
         ) from error
     with path.open("rb") as file:
         try:
-            table = parquet.read_table(file)
+            table = parquet.ParquetFile(file).read()
         except (pyarrow.ArrowException, OSError) as error:  # Arrow's OSError is of broken files
             raise DynacomError(f"{path}: must be a Parquet file ({error})") from error
     columns = {}

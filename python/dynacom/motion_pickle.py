@@ -176,6 +176,10 @@ def _to_bytes(text: str, encoding: str) -> bytes:
     return text.encode("latin1")
 
 
+def _no_bytes() -> bytes:
+    return b""
+
+
 _ALLOWED = {
     ("numpy", "dtype"): _DType,
     ("numpy", "ndarray"): _Array,
@@ -183,6 +187,7 @@ _ALLOWED = {
     ("numpy.core.multiarray", "scalar"): _scalar,
     ("numpy.core.numeric", "_frombuffer"): _from_buffer,
     ("_codecs", "encode"): _to_bytes,
+    ("__builtin__", "bytes"): _no_bytes,
 }
 
 
@@ -214,7 +219,7 @@ def _choose(path: Path, content: Any, clip: str | None) -> Mapping[str, Any]:
         and all(isinstance(inner, dict) and _find(inner, "joints") for inner in content.values())
     ):
         got = (
-            f"the keys {brief([str(key) for key in content])}"
+            f"the keys {brief([str(key) for key in content]) or 'none'}"
             if isinstance(content, dict)
             else type(content).__name__
         )

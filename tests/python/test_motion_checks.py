@@ -221,8 +221,8 @@ def test_beyond_limits_but_not_in_degrees(tmp_path, toy):
     assert_notes(
         clip,
         "order of the URDF",
-        f"The joint z_knee (-1.5 to 1.5 rad) goes beyond its limits: {table[frame, 7]:.4g} rad in frame "
-        f"{frame}.",
+        "The joint z_knee (-1.5 to 1.5 rad) goes beyond its limits: "
+        f"{table[frame, 7]:.4g} rad in frame {frame}.",
     )
 
 
