@@ -87,6 +87,10 @@ void exposeContactSchedule() {
       .def_readwrite("release_height", &Settings::release_height,
                      "It ceases to where it is higher than this [m]")
       .def_readwrite("release_speed", &Settings::release_speed, "or faster than this [m/s].")
+      .def_readwrite(
+          "rest_speed", &Settings::rest_speed,
+          "At both ends it is cut back to where it is no faster than this, or than three\n"
+          "times its median speed in the contact [m/s].")
       .def_readwrite("minimal_duration", &Settings::minimal_duration,
                      "Contacts, and interruptions, shorter than this are none [s].")
       .def_readwrite("ground_height", &Settings::ground_height,

@@ -20,6 +20,8 @@ namespace {
 constexpr double kGroundPart = 0.05;
 // What standing still is, as a part of what is slow.
 constexpr double kStill = 0.2;
+// How many times its median speed a contact may move until it is not at rest.
+constexpr double kRest = 3.;
 
 bool isNotNegative(double value) { return std::isfinite(value) && value >= 0.; }
 
@@ -61,6 +63,22 @@ void removeShort(bool value, const Eigen::VectorXd& time, double minimal_duratio
     const bool inside = first > 0 && behind < values.size();
     if (inside && before[first] == value && duration(time, first, behind) < minimal_duration)
       values.segment(first, behind - first).setConstant(!value);
+  });
+}
+
+// Cuts runs of contact back to where the contact is at rest, but for the ends of the motion.
+void cutToRest(const Eigen::VectorXd& speed, double rest_speed,
+               Eigen::Array<bool, Eigen::Dynamic, 1>& active) {
+  const Eigen::Array<bool, Eigen::Dynamic, 1> before = active;
+  forEachRun(before, [&](Eigen::Index first, Eigen::Index behind) {
+    if (!before[first]) return;
+    const double* const speeds = speed.data();
+    const double median = percentile({speeds + first, speeds + behind}, 0.5);
+    const double limit = std::max(rest_speed, kRest * median);
+    if (first > 0)
+      for (Eigen::Index frame = first; speed[frame] > limit; ++frame) active[frame] = false;
+    if (behind < active.size())
+      for (Eigen::Index frame = behind - 1; speed[frame] > limit; --frame) active[frame] = false;
   });
 }
 
@@ -123,6 +141,8 @@ void DetectionSettings::validate() const {
                "DetectionSettings.release_height", "finite and >= height", release_height);
   requireField(std::isfinite(release_speed) && release_speed >= speed,
                "DetectionSettings.release_speed", "finite and >= speed", release_speed);
+  requireField(isNotNegative(rest_speed), "DetectionSettings.rest_speed", "finite and >= 0 m/s",
+               rest_speed);
   requireField(isNotNegative(minimal_duration), "DetectionSettings.minimal_duration",
                "finite and >= 0 s", minimal_duration);
   requireField(!std::isinf(ground_height), "DetectionSettings.ground_height", "finite or NaN",
@@ -145,6 +165,7 @@ std::ostream& operator<<(std::ostream& out, const DetectionSettings& settings) {
   return out << "DetectionSettings(height=" << settings.height << ", speed=" << settings.speed
              << ", release_height=" << settings.release_height
              << ", release_speed=" << settings.release_speed
+             << ", rest_speed=" << settings.rest_speed
              << ", minimal_duration=" << settings.minimal_duration
              << ", ground_height=" << settings.ground_height
              << ", same_ground=" << settings.same_ground << ")";
@@ -208,16 +229,18 @@ ContactSchedule detectContacts(const std::vector<ContactMotion>& contacts,
   for (Eigen::Index k = 0; k < ground.size(); ++k) {
     const ContactMotion& contact = contacts[static_cast<std::size_t>(k)];
     schedule.names.push_back(contact.name);
+    const Eigen::VectorXd speed = contact.velocity.colwise().norm();
     Eigen::Array<bool, Eigen::Dynamic, 1> active(time.size());
     bool touches = false;
     for (Eigen::Index frame = 0; frame < time.size(); ++frame) {
       const double height = contact.height[frame] - ground[k];
-      const double speed = contact.velocity.col(frame).norm();
-      touches = touches ? height <= settings.release_height && speed <= settings.release_speed
-                        : height <= settings.height && speed <= settings.speed;
+      touches = touches
+                    ? height <= settings.release_height && speed[frame] <= settings.release_speed
+                    : height <= settings.height && speed[frame] <= settings.speed;
       active[frame] = touches;
     }
     removeShort(false, time, settings.minimal_duration, active);
+    cutToRest(speed, settings.rest_speed, active);
     removeShort(true, time, settings.minimal_duration, active);
     schedule.active.row(k) = active.transpose();
   }

@@ -125,22 +125,24 @@ Eigen::MatrixXd filterConfigurations(const pinocchio::Model& model, const Eigen:
   requireConfigurations(model, q, frames);
   if (frames < 2) return q;
 
-  // Two periods of the cut-off are enough for the filter to have forgotten how it began.
-  const auto periods = static_cast<Eigen::Index>(std::ceil(2. * rate / cutoff));
+  // Eight periods of the cut-off are enough for the filter to have forgotten how it began.
+  const auto periods = static_cast<Eigen::Index>(std::ceil(8. * rate / cutoff));
   const Eigen::Index padding = std::min(frames - 1, periods);
   const pinocchio::Model separated = separateFreeFlyers(model);
   Eigen::MatrixXd padded(model.nq, frames + 2 * padding);
   padded.middleCols(padding, frames) = q;
-  Eigen::VectorXd step(model.nv), reflected(model.nq);
-  const auto reflect = [&](Eigen::Index from, Eigen::Index at, Eigen::Index to) {
-    pinocchio::difference(separated, q.col(at), q.col(from), step);
+  // Step by step: what lies further away may have turned by more than a tangent space can tell.
+  Eigen::VectorXd step(model.nv), next(model.nq);
+  const auto reflect = [&](Eigen::Index from, Eigen::Index to, Eigen::Index at, int direction) {
+    pinocchio::difference(separated, padded.col(from), padded.col(to), step);
     step = -step;
-    pinocchio::integrate(separated, q.col(at), step, reflected);
-    padded.col(to) = reflected;
+    pinocchio::integrate(separated, padded.col(at), step, next);
+    padded.col(at + direction) = next;
   };
-  for (Eigen::Index k = 1; k <= padding; ++k) {
-    reflect(k, 0, padding - k);
-    reflect(frames - 1 - k, frames - 1, padding + frames - 1 + k);
+  const Eigen::Index first = padding, last = padding + frames - 1;
+  for (Eigen::Index k = 0; k < padding; ++k) {
+    reflect(first + k, first + k + 1, first - k, -1);
+    reflect(last - k, last - k - 1, last + k, 1);
   }
   for (int pass = 0; pass < 2; ++pass) {
     for (const int number : {0, 1})

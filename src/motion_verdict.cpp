@@ -51,26 +51,27 @@ struct WrenchSize {
   }
 };
 
-// How unlike the step to each frame is to its neighbours.
+// How unlike the step to each frame is to those before and after it, and to their mean: the least
+// of the three, so that what is only next to a jump is none. At the ends, where there is one side
+// only, how unlike to what its two neighbours let expect.
 Eigen::VectorXd measureJumps(const pinocchio::Model& model, const Eigen::MatrixXd& q) {
-  const Eigen::Index frames = q.cols();
+  const Eigen::Index frames = q.cols(), last = frames - 2;
   Eigen::VectorXd jumps = Eigen::VectorXd::Zero(frames);
-  if (frames < 3) return jumps;
+  if (frames < 4) return jumps;
   Eigen::MatrixXd steps(model.nv, frames - 1);
   Eigen::VectorXd step(model.nv);
-  for (Eigen::Index frame = 0; frame + 1 < frames; ++frame) {
-    pinocchio::difference(model, q.col(frame), q.col(frame + 1), step);
-    steps.col(frame) = step;
+  for (Eigen::Index k = 0; k <= last; ++k) {
+    pinocchio::difference(model, q.col(k), q.col(k + 1), step);
+    steps.col(k) = step;
   }
-  for (Eigen::Index k = 0; k < steps.cols(); ++k) {
-    const Eigen::Index before = std::max<Eigen::Index>(k - 1, 0);
-    const Eigen::Index after = std::min(k + 1, steps.cols() - 1);
-    // At the ends, the one neighbour that there is.
-    step = k == 0                  ? Eigen::VectorXd(steps.col(after))
-           : k == steps.cols() - 1 ? Eigen::VectorXd(steps.col(before))
-                                   : Eigen::VectorXd(0.5 * (steps.col(before) + steps.col(after)));
-    jumps[k + 1] = (steps.col(k) - step).lpNorm<Eigen::Infinity>();
-  }
+  const auto distance = [&](Eigen::Index k, const auto& expected) {
+    return (steps.col(k) - expected).template lpNorm<Eigen::Infinity>();
+  };
+  jumps[1] = distance(0, 2. * steps.col(1) - steps.col(2));
+  jumps[frames - 1] = distance(last, 2. * steps.col(last - 1) - steps.col(last - 2));
+  for (Eigen::Index k = 1; k < last; ++k)
+    jumps[k + 1] = std::min({distance(k, steps.col(k - 1)), distance(k, steps.col(k + 1)),
+                             distance(k, 0.5 * (steps.col(k - 1) + steps.col(k + 1)))});
   return jumps;
 }
 

@@ -120,25 +120,51 @@ BOOST_AUTO_TEST_CASE(a_contact_begins_low_and_slow_and_ends_high_or_fast) {
   settings.height = 0.01;
   settings.release_height = 0.02;
   settings.speed = 0.1;
-  settings.release_speed = 0.2;
+  settings.release_speed = settings.rest_speed = 0.2;
   settings.minimal_duration = 0.;
-  const VectorXd time = timeOf(8), ground = VectorXd::Constant(1, 1.);
-  const auto detect = [&](const std::vector<double>& heights, const std::vector<double>& speeds) {
+  const VectorXd time = timeOf(8);
+  const auto detect = [&](const std::vector<double>& heights, const std::vector<double>& speeds,
+                          double ground = 0.) {
     const auto at = [&](const std::vector<double>& values) {
       return [&](double t) { return values[static_cast<std::size_t>(std::lround(t / 0.01))]; };
     };
     const auto contact = contactOf("foot", time, at(heights), at(speeds));
-    return drawn(detectContacts({contact}, time, ground, settings));
+    return drawn(detectContacts({contact}, time, VectorXd::Constant(1, ground), settings));
   };
-  const std::vector<double> low(8, 1.), slow(8, 0.);
+  const std::vector<double> low(8, 0.), slow(8, 0.), deep(8, -0.1);
   BOOST_TEST(detect(low, slow) == "########");
-  BOOST_TEST(detect({1.03, 1.015, 1.01, 1.015, 1.02, 1.021, 1.015, 1.01}, slow) == "..###..#");
+  BOOST_TEST(detect({0.03, 0.015, 0.01, 0.015, 0.02, 0.021, 0.015, 0.01}, slow) == "..###..#");
   BOOST_TEST(detect(low, {0.3, 0.15, 0.1, 0.15, 0.2, 0.21, 0.15, 0.1}) == "..###..#");
   // Both must hold to begin, and one is enough to end.
-  BOOST_TEST(detect({1., 1., 1.03, 1.03, 1., 1., 1., 1.}, {0., 0., 0., 0., 0.3, 0.3, 0., 0.}) ==
+  BOOST_TEST(detect({0., 0., 0.03, 0.03, 0., 0., 0., 0.}, {0., 0., 0., 0., 0.3, 0.3, 0., 0.}) ==
              "##....##");
-  // Below the ground is no higher than it.
-  BOOST_TEST(detect({0.9, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9}, slow) == "########");
+  // Heights are those above the ground; below it is no higher than it.
+  BOOST_TEST(detect(low, slow, -0.05) == "........");
+  BOOST_TEST(detect(deep, slow) == "########");
+}
+
+BOOST_AUTO_TEST_CASE(a_contact_is_at_rest_at_both_ends) {
+  DetectionSettings settings;
+  settings.speed = settings.release_speed = 1.;
+  settings.rest_speed = 0.1;
+  settings.minimal_duration = 0.;
+  const auto detect = [&](const std::vector<double>& speeds) {
+    const VectorXd time = timeOf(static_cast<Index>(speeds.size()));
+    const auto speed = [&](double t) {
+      return speeds[static_cast<std::size_t>(std::lround(t / 0.01))];
+    };
+    return drawn(detectContacts({contactOf("foot", time, constant(0.), speed)}, time,
+                                VectorXd::Zero(1), settings));
+  };
+  BOOST_TEST(detect({2., 0.5, 0.1, 0., 0.5, 0., 0., 0., 0.11, 2.}) == "..######..");
+  // What is never quite at rest may move three times as fast as it mostly does.
+  BOOST_TEST(detect({2., 0.61, 0.6, 0.2, 0.2, 0.2, 0.2, 0.2, 0.6, 2.}) == "..#######.");
+  // Nobody knows what was before the beginning and what comes after the end.
+  BOOST_TEST(detect({0.5, 0.5, 0., 0., 0., 0., 0.5, 0.5}) == "########");
+  // And what is left may be too short.
+  BOOST_TEST(detect({2., 0.9, 0.9, 0., 0., 0., 0., 2., 2., 2.}) == "...####...");
+  settings.minimal_duration = 0.05;
+  BOOST_TEST(detect({2., 0.9, 0.9, 0., 0., 0., 0., 2., 2., 2.}) == "..........");
 }
 
 BOOST_AUTO_TEST_CASE(what_is_too_short_is_none) {
@@ -225,6 +251,7 @@ BOOST_AUTO_TEST_CASE(settings_and_sizes_are_checked) {
   refused([](auto& s) { s.speed = kNaN; }, {"DetectionSettings.speed", "nan"});
   refused([](auto& s) { s.release_height = 0.001; }, {"DetectionSettings.release_height", "0.001"});
   refused([](auto& s) { s.release_speed = 0.001; }, {"DetectionSettings.release_speed", "0.001"});
+  refused([](auto& s) { s.rest_speed = -1.; }, {"DetectionSettings.rest_speed", "-1"});
   refused([](auto& s) { s.minimal_duration = -1.; }, {"DetectionSettings.minimal_duration", "-1"});
   refused([](auto& s) { s.ground_height = 1. / 0.; }, {"DetectionSettings.ground_height", "inf"});
   refused([](auto& s) { s.same_ground = -1.; }, {"DetectionSettings.same_ground", "-1"});

@@ -53,8 +53,8 @@ struct FaultLimit {
 /// The limits of all faults, and what else judgeMotion() needs to know. Recorded motions of real
 /// people, fitted to a robot, are never exact: the defaults let pass what a controller can mend.
 struct DYNACOM_EXPORT VerdictSettings {
-  FaultLimit residual_force = {0.1, 0.02};
-  FaultLimit residual_torque = {0.05, 0.02};
+  FaultLimit residual_force = {0.1, 0.05};
+  FaultLimit residual_torque = {0.03, 0.05};
   FaultLimit flight_with_support_needed = {0.05, 0.02};
   FaultLimit contact_missing = {0.05, 0.02};
   FaultLimit ground_penetration = {0.02, 0.02};

@@ -349,6 +349,8 @@ def _analyze(
         "ground": dict(zip(robot.contacts, ground.tolist(), strict=True)),
         "contacts": {c.name: _summarize_contact(c, weight) for c in analysis.contacts},
         "mean_vertical_force": float(analysis.ground_force[:, 2].mean() / weight),
+        "momentum_change": _momentum_change(analysis, dynamics.getMass()) / weight,
+        "unexplained": _unexplained(clip, analysis),
         "measured": _compare_forces(clip, analysis),
         "options": options.to_dict(),
     }
@@ -452,6 +454,37 @@ def _ground_text(robot: Robot, ground: np.ndarray) -> str:
 def _weight(dynamics: DynaCoM) -> float:
     """What forces are compared with: m g, of standard gravity where there is none [N]."""
     return dynamics.getMass() * (-dynamics.getSettings().gravity[2] or 9.81)
+
+
+def _momentum_change(analysis: MotionAnalysis, mass: float) -> float:
+    """What part of the mean vertical force ends in momentum [N]: the clip may begin in a fall."""
+    time, velocity = analysis.time, analysis.vcom[:, 2]
+    duration = time[-1] - time[0]
+    return float(mass * (velocity[-1] - velocity[0]) / duration) if duration > 0.0 else 0.0
+
+
+def _unexplained(clip: Clip, analysis: MotionAnalysis) -> dict[str, Any]:
+    """What the contacts cannot give, over all frames: noise has no mean, but a load has.
+
+    The mean force [N] and moment about the CoM [N m] are in the heading's axes: x to where the root
+    looks, z up.
+    """
+    x, y, z, w = clip.q[:, 3:7].T
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    forward = np.stack([cos, sin, 0.0 * yaw], axis=1)
+    left = np.stack([-sin, cos, 0.0 * yaw], axis=1)
+    residual = analysis.residual.reshape(-1, 2, 3)
+    means = [
+        [
+            float((part * forward).sum(axis=1).mean()),
+            float((part * left).sum(axis=1).mean()),
+            float(part[:, 2].mean()),
+        ]
+        for part in (residual[:, 0], residual[:, 1])
+    ]
+    solved = [status.name == "Solved" for status in analysis.status]
+    return {"share": 1.0 - float(np.mean(solved)), "force": means[0], "torque": means[1]}
 
 
 def _codes(verdict: MotionVerdict) -> list[str]:

@@ -25,7 +25,20 @@ def summary_table(summary: dict[str, Any]) -> Table:
     for status, count in summary["statuses"].items():
         table.add_row(f"  {status}", f"{count} ({count / summary['frames']:.1%})")
     table.add_row("Mass", f"{summary['mass']:.3f} kg")
-    table.add_row("Mean vertical force", f"{summary['mean_vertical_force']:.1%} of the weight")
+    mean, change = summary["mean_vertical_force"], summary["momentum_change"]
+    text = f"{mean:.1%} of the weight"
+    if abs(change) >= 0.0005:
+        text += f", of which {change:+.1%} ends in momentum"
+    table.add_row("Mean vertical force", text)
+    unexplained = summary["unexplained"]
+    if unexplained["share"] > 0.0:
+        force = ", ".join(f"{value:.3g}" for value in unexplained["force"])
+        torque = ", ".join(f"{value:.3g}" for value in unexplained["torque"])
+        table.add_row(
+            "Unexplained load",
+            f"in {unexplained['share']:.1%} of the frames; on average ({force}) N and ({torque}) "
+            "N m, forward, left and up",
+        )
     for entry in summary["cutoff_sensitivity"]:
         table.add_row(
             f"Residual at {entry['cutoff']:g} Hz",
