@@ -238,7 +238,8 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
         flight && residual.larger() > settings.flight_with_support_needed.limit;
     const bool out_of_reach = flight ? unsupported : !residual.isWithin(settings);
     const bool contact_missing =
-        out_of_reach && (near != active).any() &&
+        out_of_reach && residual.larger() > settings.contact_missing.limit &&
+        (near != active).any() &&
         WrenchSize(second_look.findResidual(motion, frame, near), weight).isWithin(settings);
     if (contact_missing) {
       measure(MotionFault::ContactMissing)[frame] = residual.larger();

@@ -144,13 +144,13 @@ BOOST_AUTO_TEST_CASE(contacts_that_would_help_are_missing) {
 
   // One of them is missing: the other alone cannot bear the weight beside it.
   Stand beside;
-  beside.schedule.active.row(1).segment(60, 5).setConstant(false);
+  beside.schedule.active.row(1).segment(60, 6).setConstant(false);
   const MotionVerdict verdict = beside.judge();
   BOOST_TEST(verdict[MotionFault::ContactMissing].holds);
-  BOOST_TEST(verdict[MotionFault::ContactMissing].frames == 5);
+  BOOST_TEST(verdict[MotionFault::ContactMissing].frames == 6);
   BOOST_TEST(!verdict[MotionFault::ResidualTorque].holds);
   // It would not help against what no sole can give.
-  beside.motion.a.row(2).segment(60, 5).setConstant(-14.);
+  beside.motion.a.row(2).segment(60, 6).setConstant(-14.);
   BOOST_TEST(!beside.judge()[MotionFault::ContactMissing].holds);
   BOOST_TEST(beside.judge()[MotionFault::ResidualForce].holds);
 }

@@ -13,15 +13,16 @@ namespace dynacom {
 /// What may be wrong with a motion. In each frame something is measured; forces are parts of the
 /// robot's weight m g, moments of m g times a metre.
 enum class MotionFault {
-  /// The contacts cannot give the force: ‖force of the residual‖ [m g]. Not in frames of the next
-  /// but one or two.
+  /// The contacts cannot give the force: ‖force of the residual‖ [m g]. Zero in frames of
+  /// FlightWithSupportNeeded and ContactMissing.
   ResidualForce,
   /// The contacts cannot give the moment: ‖moment of the residual‖ [m g·m]. Likewise.
   ResidualTorque,
   /// No contact is active, but something must be given: the larger of ‖f‖ [m g] and ‖τ‖ [m g·m].
   FlightWithSupportNeeded,
   /// Contacts that are just above the ground, and not active, would give what is out of reach: the
-  /// larger of the residual's force [m g] and moment [m g·m] without them.
+  /// larger of the residual's force [m g] and moment [m g·m] without them. Where that is within the
+  /// limit, the frame counts as one of the above.
   ContactMissing,
   /// A contact's lowest corner is below its ground: how deep [m].
   GroundPenetration,
@@ -56,7 +57,7 @@ struct DYNACOM_EXPORT VerdictSettings {
   FaultLimit residual_force = {0.1, 0.05};
   FaultLimit residual_torque = {0.03, 0.05};
   FaultLimit flight_with_support_needed = {0.05, 0.02};
-  FaultLimit contact_missing = {0.05, 0.02};
+  FaultLimit contact_missing = {0.03, 0.02};
   FaultLimit ground_penetration = {0.02, 0.02};
   FaultLimit foot_sliding = {0.2, 0.02};
   FaultLimit discontinuity = {0.15, 0.};
