@@ -157,8 +157,9 @@ bool DetectionSettings::operator==(const DetectionSettings& other) const {
   const bool same_ground_height = ground_height == other.ground_height ||
                                   (std::isnan(ground_height) && std::isnan(other.ground_height));
   return height == other.height && speed == other.speed && release_height == other.release_height &&
-         release_speed == other.release_speed && minimal_duration == other.minimal_duration &&
-         same_ground_height && same_ground == other.same_ground;
+         release_speed == other.release_speed && rest_speed == other.rest_speed &&
+         minimal_duration == other.minimal_duration && same_ground_height &&
+         same_ground == other.same_ground;
 }
 
 std::ostream& operator<<(std::ostream& out, const DetectionSettings& settings) {
