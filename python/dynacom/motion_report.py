@@ -232,6 +232,7 @@ def analyze(
     fps: float | None = None,
     quat: str | None = None,
     trust: bool = False,
+    clip: str | None = None,
     schedule: str | Path | ContactSchedule | None = None,
     options: AnalysisOptions | None = None,
     progress: Callable[[float], None] | None = None,
@@ -245,7 +246,7 @@ def analyze(
     Args:
         motion: a file, see :func:`read_motion`, or what was read from one.
         robot: a robot, or the name or file of one, see :func:`load_robot`.
-        fps, quat, trust: as in :func:`read_motion`.
+        fps, quat, trust, clip: as in :func:`read_motion`.
         schedule: a file, see docs/files.md, or a schedule with T frames.
         options: settings; their defaults by default.
         progress: called now and then with what part of the work is done.
@@ -259,13 +260,12 @@ def analyze(
     options = options or AnalysisOptions()
     if not isinstance(robot, Robot):
         robot = load_robot(robot)
-    clip = motion
-    if not isinstance(clip, Clip):
-        clip = read_motion(motion, robot, fps=fps, quat=quat, trust=trust)
+    if not isinstance(motion, Clip):
+        motion = read_motion(motion, robot, fps=fps, quat=quat, trust=trust, clip=clip)
     try:
-        return _analyze(clip, robot, schedule, options, progress or (lambda part: None))
+        return _analyze(motion, robot, schedule, options, progress or (lambda part: None))
     except ValueError as error:
-        raise DynacomError(f"{clip.path}: {error}") from error
+        raise DynacomError(f"{motion.path}: {error}") from error
 
 
 @dataclass(frozen=True)
