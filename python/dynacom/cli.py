@@ -113,6 +113,10 @@ _Trust = Annotated[
     bool,
     typer.Option("--trust", help="Read pickles that may run code as they are read."),
 ]
+_ClipName = Annotated[
+    str | None,
+    typer.Option("--clip", metavar="NAME", help="Which clip, where a pickle holds several."),
+]
 _Schedule = Annotated[
     Path | None,
     typer.Option(metavar="FILE.yaml", help="When contacts are active, such as schedule.yaml."),
@@ -164,6 +168,7 @@ def analyze(
     fps: _Fps = None,
     quat: _Quat = None,
     trust: _Trust = False,
+    clip_name: _ClipName = None,
     schedule: _Schedule = None,
     cutoff: _Cutoff = None,
     ground_height: _Ground = None,
@@ -202,6 +207,7 @@ def analyze(
         fps=fps,
         quat=quat,
         trust=trust,
+        clip=clip_name,
     )
     files = report.save(out or Path(f"{clip.name.split('.')[0]}-analysis"), csv=csv, page=page)
     console = Console()
@@ -222,6 +228,7 @@ def show(
     fps: _Fps = None,
     quat: _Quat = None,
     trust: _Trust = False,
+    clip_name: _ClipName = None,
     schedule: _Schedule = None,
     cutoff: _Cutoff = None,
     ground_height: _Ground = None,
@@ -242,6 +249,7 @@ def show(
         fps=fps,
         quat=quat,
         trust=trust,
+        clip=clip_name,
     )
     scene.show(
         report.robot,
@@ -253,10 +261,10 @@ def show(
     )
 
 
-def _analyze(clip, robot, schedule, options, **reading) -> "dynacom.MotionReport":
+def _analyze(motion, robot, schedule, options, **reading) -> "dynacom.MotionReport":
     with _progress() as progress:
         return dynacom.analyze(
-            clip, robot, schedule=schedule, options=options, progress=progress, **reading
+            motion, robot, schedule=schedule, options=options, progress=progress, **reading
         )
 
 

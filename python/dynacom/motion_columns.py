@@ -6,6 +6,7 @@ They are those that docs/files.md lists.
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -46,17 +47,9 @@ def clip_from_columns(
     Raises:
         DynacomError: as :func:`read_motion`.
     """
-    labels = {name: f"column '{name}'" for name in columns} | dict(labels or {})
-
-    def take(names: list[str]) -> np.ndarray:
-        values = np.array([columns[name] for name in names], dtype=float)
-        values = values.reshape(len(names), frames).T  # if there is none, too
-        check_finite(path, [labels[name] for name in names], values)
-        return values
-
     root = [_find_root(path, columns, name) for name in ROOT_COLUMNS]
-    frames = len(columns[root[0]])
-    contacts = {name: match for name in columns if (match := _CONTACT.fullmatch(name))}
+    table = _Table(path, columns, labels or {}, len(columns[root[0]]))
+    contacts = [name for name in columns if _CONTACT.fullmatch(name)]
     times = [name for name in _TIME_COLUMNS if name in columns]
     others = {*root, *contacts, *times, *_IGNORED_COLUMNS}
     joints = [name for name in columns if name not in others]
@@ -64,28 +57,62 @@ def clip_from_columns(
     notes = list(notes)
     if order is None and options.quat is not None:
         notes.append("The columns of the root's quaternion have names: --quat is not used.")
-    time, more = make_time(
-        path,
-        frames,
-        time=columns[times[0]].astype(float) if times else None,
-        fps=options.fps,
-    )
+    time = columns[times[0]].astype(float) if times else None
+    time, more = make_time(path, table.frames, time=time, fps=options.fps)
     notes += more
     known, more = match_joints(path, robot, joints)
     notes += more
     names = [joints[index] for index in known]
-    values = take(root)
+    pose = table.take(root)
+    schedule, forces = _read_contacts(robot, table, contacts)
+    return clip_from_joints(
+        path,
+        robot,
+        time,
+        pose[:, :3],
+        pose[:, 3:],
+        names,
+        table.take(names),
+        order=order,
+        option=True,
+        notes=notes,
+        schedule=schedule,
+        forces=forces,
+    )
 
+
+@dataclass(frozen=True)
+class _Table:
+    path: Path
+    columns: Mapping[str, np.ndarray]
+    labels: Mapping[str, str]
+    frames: int
+
+    def label(self, name: str) -> str:
+        return self.labels.get(name, f"column '{name}'")
+
+    def take(self, names: Sequence[str]) -> np.ndarray:
+        """Columns of finite numbers, (T, k)."""
+        values = np.array([self.columns[name] for name in names], dtype=float)
+        values = values.reshape(len(names), self.frames).T  # if there is none, too
+        check_finite(self.path, [self.label(name) for name in names], values)
+        return values
+
+
+def _read_contacts(
+    robot: Robot, table: _Table, columns: Sequence[str]
+) -> tuple[ContactSchedule | None, dict[str, np.ndarray]]:
+    """The schedule, if there, and forces by contact."""
     active: dict[str, np.ndarray] = {}
     components: dict[str, dict[str, str]] = {}
-    for column, match in contacts.items():
-        name, what = match["name"], match["what"]
-        if what == "active":
-            active[name] = _switch(path, labels[column], take([column])[:, 0])
+    for column in columns:
+        match = _CONTACT.fullmatch(column)
+        if match["what"] == "active":
+            active[match["name"]] = _switch(table, column)
         else:
-            components.setdefault(name, {})[what] = column
-    check_contacts(path, robot, [*active])
-    check_contacts(path, robot, [*components])
+            components.setdefault(match["name"], {})[match["what"]] = column
+    check_contacts(table.path, robot, [*active])
+    check_contacts(table.path, robot, [*components])
     forces = {}
     for name, by_component in components.items():
         wanted = [f"force_{axis}" for axis in "xyz"]
@@ -93,23 +120,10 @@ def clip_from_columns(
             wanted += [f"torque_{axis}" for axis in "xyz"]
         for key in wanted:
             if key not in by_component:
-                raise DynacomError(f"{path}: missing column 'contact.{name}.{key}'")
-        forces[name] = take([by_component[key] for key in wanted])
-
-    return clip_from_joints(
-        path,
-        robot,
-        time,
-        values[:, :3],
-        values[:, 3:],
-        names,
-        take(names),
-        order=order,
-        option=True,
-        notes=notes,
-        schedule=ContactSchedule([*active], np.stack([*active.values()], 1)) if active else None,
-        forces=forces,
-    )
+                raise DynacomError(f"{table.path}: missing column 'contact.{name}.{key}'")
+        forces[name] = table.take([by_component[key] for key in wanted])
+    schedule = ContactSchedule([*active], np.stack([*active.values()], 1)) if active else None
+    return schedule, forces
 
 
 def _find_root(path: Path, columns: Mapping[str, np.ndarray], name: str) -> str:
@@ -120,9 +134,14 @@ def _find_root(path: Path, columns: Mapping[str, np.ndarray], name: str) -> str:
     return found[0]
 
 
-def _switch(path: Path, what: str, values: np.ndarray) -> np.ndarray:
+def _switch(table: _Table, column: str) -> np.ndarray:
+    """A column of 0 and 1, (T,) of bool."""
+    values = table.take([column])[:, 0]
     wrong = (values != 0.0) & (values != 1.0)
     if wrong.any():
         frame = int(np.argmax(wrong))
-        raise DynacomError(f"{path}: {what} must be 0 or 1, got {values[frame]:g} in frame {frame}")
+        raise DynacomError(
+            f"{table.path}: {table.label(column)} must be 0 or 1, got {values[frame]:g} in frame "
+            f"{frame}"
+        )
     return values == 1.0

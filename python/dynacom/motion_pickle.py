@@ -52,7 +52,10 @@ def read_pickle(path: Path, robot: Robot, options: Options) -> Clip:
 
     time, notes = make_time(path, frames, file_fps=_frame_rate(path, content), fps=options.fps)
     if (key := _find(content, "names")) and content[key] is not None:
-        names = [str(name) for name in np.asarray(_plain(content[key])).ravel()]
+        try:
+            names = np.asarray(content[key], dtype=str).ravel().tolist()
+        except (TypeError, ValueError) as error:
+            raise DynacomError(f"{path}: {key} must be names ({error})") from error
         if len(names) != joints.shape[1]:
             raise DynacomError(
                 f"{path}: {key} must name {joints.shape[1]} joints, got {len(names)}"
@@ -250,7 +253,7 @@ def _numbers(path: Path, content: Mapping[str, Any], what: str, columns: int | N
         )
     try:
         values = np.asarray(content[key], dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise DynacomError(f"{path}: {key} must be an array of numbers ({error})") from error
     if values.ndim == 3 and values.shape[2] == 1:  # joints of one degree of freedom each
         values = values[:, :, 0]
@@ -267,6 +270,6 @@ def _frame_rate(path: Path, content: Mapping[str, Any]) -> float | None:
         return None
     try:
         (fps,) = np.asarray(content["fps"], dtype=float).ravel()
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise DynacomError(f"{path}: fps must be a number ({error})") from error
     return float(fps)

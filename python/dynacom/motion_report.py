@@ -232,6 +232,7 @@ def analyze(
     fps: float | None = None,
     quat: str | None = None,
     trust: bool = False,
+    clip: str | None = None,
     schedule: str | Path | ContactSchedule | None = None,
     options: AnalysisOptions | None = None,
     progress: Callable[[float], None] | None = None,
@@ -245,7 +246,7 @@ def analyze(
     Args:
         motion: a file, see :func:`read_motion`, or what was read from one.
         robot: a robot, or the name or file of one, see :func:`load_robot`.
-        fps, quat, trust: as in :func:`read_motion`.
+        fps, quat, trust, clip: as in :func:`read_motion`.
         schedule: a file, see docs/files.md, or a schedule with T frames.
         options: settings; their defaults by default.
         progress: called now and then with what part of the work is done.
@@ -259,13 +260,12 @@ def analyze(
     options = options or AnalysisOptions()
     if not isinstance(robot, Robot):
         robot = load_robot(robot)
-    clip = motion
-    if not isinstance(clip, Clip):
-        clip = read_motion(motion, robot, fps=fps, quat=quat, trust=trust)
+    if not isinstance(motion, Clip):
+        motion = read_motion(motion, robot, fps=fps, quat=quat, trust=trust, clip=clip)
     try:
-        return _analyze(clip, robot, schedule, options, progress or (lambda part: None))
+        return _analyze(motion, robot, schedule, options, progress or (lambda part: None))
     except ValueError as error:
-        raise DynacomError(f"{clip.path}: {error}") from error
+        raise DynacomError(f"{motion.path}: {error}") from error
 
 
 @dataclass(frozen=True)
@@ -330,6 +330,10 @@ def _analyze(
         sensitivity.sort(key=lambda entry: entry["cutoff"])
 
     arrays = _collect_arrays(clip, analysis, contacts, ground)
+    unexplained = _unexplained(clip, analysis)
+    notes = [*clip.notes, derived.text, schedule_text, _ground_text(robot, ground)]
+    if unexplained["share"] > 0.0:
+        notes.append(_unexplained_text(unexplained))
     summary = {
         "clip": clip.path.name,
         "robot": robot.name,
@@ -342,7 +346,7 @@ def _analyze(
         "codes": _codes(verdict),
         "reasons": _reasons(verdict, options, len(clip.time)),
         "statuses": dict(Counter(status.name for status in analysis.status)),
-        "notes": [*clip.notes, derived.text, schedule_text, _ground_text(robot, ground)],
+        "notes": notes,
         "derivatives": derived.text,
         "cutoff": derived.cutoff,
         "cutoff_sensitivity": sensitivity,
@@ -350,7 +354,7 @@ def _analyze(
         "contacts": {c.name: _summarize_contact(c, weight) for c in analysis.contacts},
         "mean_vertical_force": float(analysis.ground_force[:, 2].mean() / weight),
         "momentum_change": _momentum_change(analysis, dynamics.getMass()) / weight,
-        "unexplained": _unexplained(clip, analysis),
+        "unexplained": unexplained,
         "measured": _compare_forces(clip, analysis),
         "options": options.to_dict(),
     }
@@ -485,6 +489,17 @@ def _unexplained(clip: Clip, analysis: MotionAnalysis) -> dict[str, Any]:
     ]
     solved = [status.name == "Solved" for status in analysis.status]
     return {"share": 1.0 - float(np.mean(solved)), "force": means[0], "torque": means[1]}
+
+
+def _unexplained_text(unexplained: dict[str, Any]) -> str:
+    force, torque = (
+        ", ".join(f"{value:.3g}" for value in unexplained[part]) for part in ("force", "torque")
+    )
+    return (
+        f"In {unexplained['share']:.1%} of the frames the contacts cannot give what the motion "
+        f"takes. Over all frames, ({force}) N and ({torque}) N m are missing on average, forward, "
+        "left and up: noise has no mean, but a load that the robot carries has."
+    )
 
 
 def _codes(verdict: MotionVerdict) -> list[str]:

@@ -30,15 +30,6 @@ def summary_table(summary: dict[str, Any]) -> Table:
     if abs(change) >= 0.0005:
         text += f", of which {change:+.1%} ends in momentum"
     table.add_row("Mean vertical force", text)
-    unexplained = summary["unexplained"]
-    if unexplained["share"] > 0.0:
-        force = ", ".join(f"{value:.3g}" for value in unexplained["force"])
-        torque = ", ".join(f"{value:.3g}" for value in unexplained["torque"])
-        table.add_row(
-            "Unexplained load",
-            f"in {unexplained['share']:.1%} of the frames; on average ({force}) N and ({torque}) "
-            "N m, forward, left and up",
-        )
     for entry in summary["cutoff_sensitivity"]:
         table.add_row(
             f"Residual at {entry['cutoff']:g} Hz",
