@@ -258,6 +258,7 @@ def analyze(
         ValueError: options are out of their ranges.
     """
     options = options or AnalysisOptions()
+    options.validate()
     if not isinstance(robot, Robot):
         robot = load_robot(robot)
     if not isinstance(motion, Clip):
