@@ -183,7 +183,7 @@ void DualNewton::setContact(std::size_t slot, const Contact& contact) {
   block.e.setZero();
   block.has_pure_moments = false;
   block.state = State();
-  block.last_problem = problem_;
+  block.last_problem_number = problem_number_;
   block.is_free.setZero();
   block.edge.setZero();
   block.inverse_stiffness = 0.;
@@ -192,9 +192,9 @@ void DualNewton::setContact(std::size_t slot, const Contact& contact) {
 void DualNewton::setActive(const std::vector<std::size_t>& slots,
                            const std::vector<Contact>& contacts) {
   // Where a foot comes down, the state that it was lifted from says nothing.
-  for (const std::size_t slot : active_) blocks_[slot].last_problem = problem_;
+  for (const std::size_t slot : active_) blocks_[slot].last_problem_number = problem_number_;
   for (const std::size_t slot : slots)
-    if (problem_ - blocks_[slot].last_problem > kShortAbsence)
+    if (problem_number_ - blocks_[slot].last_problem_number > kShortAbsence)
       blocks_[slot].last = blocks_[slot].free;
   active_ = slots;
   recognised_ = true;
@@ -212,16 +212,16 @@ void DualNewton::setActive(const std::vector<std::size_t>& slots,
   }
 }
 
-// Begins with the states of the last answer, or with all components free but for those that are
-// always zero. Returns whether that is another state than the latter.
-bool DualNewton::begin(bool from_last_answer) {
-  bool bound = false;
+// Enters the state to start from, contact by contact. Returns whether any differs from
+// Start::Free.
+bool DualNewton::begin(Start start) {
+  bool differs = false;
   for (const std::size_t slot : active_) {
     Block& block = blocks_[slot];
-    enter(block, from_last_answer ? block.last : block.free);
-    bound = bound || !(block.state == block.free);
+    enter(block, start == Start::LastAnswer ? block.last : block.free);
+    differs = differs || !(block.state == block.free);
   }
-  return bound;
+  return differs;
 }
 
 void DualNewton::enter(Block& block, const State& state) {
@@ -414,7 +414,7 @@ void DualNewton::assembleCompliance() {
 // or if the state hardly gives some wrenches.
 bool DualNewton::stepFreely(int steps) {
   rank_ = 6;
-  for (int step = 0; step < steps && iterations_ < maximal_iterations_; ++step) {
+  for (int step = 0; step < steps && stepsTaken() < maximal_iterations_; ++step) {
     ++iterations_;
     assembleCompliance();
     factors_.compute(compliance_);
@@ -441,7 +441,7 @@ bool DualNewton::stepFreely(int steps) {
 // Returns false if it does not.
 bool DualNewton::stepWithSlack() {
   Vector6 gradient = achieved_ + slack_ * multipliers_ - target_;
-  while (iterations_ < std::min(kMaximalSteps, maximal_iterations_)) {
+  while (stepsTaken() < std::min(kMaximalSteps, maximal_iterations_)) {
     ++iterations_;
     assembleCompliance();
     Matrix6 slackened = compliance_;
@@ -646,8 +646,8 @@ bool DualNewton::isFinite() const {
 DistributionStatus DualNewton::solve(const std::vector<Contact>& contacts, const Vector6& target,
                                      const Vector6& wrench_weights, bool warm_start,
                                      int maximal_iterations) {
-  ++problem_;
-  iterations_ = 0;
+  ++problem_number_;
+  iterations_ = iterations_in_vain_ = 0;
   maximal_iterations_ = maximal_iterations;
   if (!recognised_) return DistributionStatus::NumericalFailure;
   weights_ = wrench_weights;
@@ -672,17 +672,21 @@ DistributionStatus DualNewton::search(bool from_last_answer) {
   const bool was_finished = finished_;
   finished_ = false;
   bool reached = false;
-  const bool is_bound = from_last_answer && begin(true);
-  if (is_bound || (from_last_answer && was_finished)) {
-    reached = stepFreely(kFreeStepsFromLast);
-    if (!reached && was_finished && iterations_ == 1 && !hasFullRank()) {
-      // The state of the last answer may lead to this one as it led to that.
-      const DistributionStatus status = finish();
-      if (status != DistributionStatus::NumericalFailure) return status;
+  if (from_last_answer) {
+    // With all components free, it is the start without a last answer.
+    const bool differs = begin(Start::LastAnswer);
+    if (differs || was_finished) {
+      reached = stepFreely(kFreeStepsFromLast);
+      if (!reached && was_finished && iterations_ == 1 && !hasFullRank()) {
+        // The state of the last answer may lead to this one as it led to that.
+        const DistributionStatus status = finish();
+        if (status != DistributionStatus::NumericalFailure) return status;
+      }
+      if (!reached) iterations_in_vain_ = iterations_;
     }
   }
   if (!reached) {
-    if (!from_last_answer || iterations_ > 0) begin(false);
+    begin(Start::Free);
     reached = stepFreely(kFreeSteps);
   }
   if (reached) {

@@ -102,6 +102,11 @@ class DualNewton {
   /// How many steps solve() took.
   int iterations() const { return iterations_; }
 
+  /// How many of them were an attempt from the last answer that led nowhere: at most
+  /// maximal_iterations, which counts the others on their own, so that a warm start finds whatever
+  /// is found without.
+  int iterationsInVain() const { return iterations_in_vain_; }
+
  private:
   using Matrix6 = Factors6::Matrix6;
 
@@ -114,6 +119,10 @@ class DualNewton {
       return loaded == other.loaded && (!loaded || bounds == other.bounds);
     }
   };
+
+  /// Where to start from: no component at its bound but for those that are always zero, or the
+  /// state that led to the last answer.
+  enum class Start { Free, LastAnswer };
 
   /// A contact in units of its cost: its forces are x = W λ, with W the weights over the largest.
   /// What a point does not have is zero.
@@ -129,7 +138,7 @@ class DualNewton {
     // The state with no component at its bound, but for those without extent; that at hand, and at
     // the last keepStates(); and the one that led to the last answer.
     State free, state, former, last;
-    std::size_t last_problem;  // that it took part in, when it did not any more
+    std::size_t last_problem_number;  // of that it took part in, when it did not any more
     // In this state, forces that respond to a pull are its projection on the free components, and
     // on the direction in which those at their bounds go with the normal force.
     Vector6 is_free, edge;
@@ -148,7 +157,7 @@ class DualNewton {
   static Vector6 pullOf(const Block& block, const Vector6& multipliers);
   static void addWrench(const Block& block, const Vector6& force, Vector6& wrench);
   static Vector6 normalWrench(const Block& block);
-  bool begin(bool from_last_answer);
+  bool begin(Start start);
   void keepStates();
   bool evaluate();
   void restart(const Vector6& multipliers);
@@ -158,6 +167,7 @@ class DualNewton {
   bool isReached(const Vector6& wrench, double enough) const;
   void refine(const Vector6& wrench, double enough);
   bool isFinite() const;
+  int stepsTaken() const { return iterations_ - iterations_in_vain_; }
   bool stepFreely(int steps);
   bool stepWithSlack();
   DistributionStatus search(bool from_last_answer);
@@ -183,8 +193,8 @@ class DualNewton {
   int rank_ = 6;
   Matrix6 range_ = Matrix6::Zero();
   std::vector<Vector6> directions_;
-  int iterations_ = 0, maximal_iterations_ = 0;
-  std::size_t problem_ = 0;  // counts solve()
+  int iterations_ = 0, iterations_in_vain_ = 0, maximal_iterations_ = 0;
+  std::size_t problem_number_ = 0;  // counts solve()
 };
 
 }  // namespace dynacom::internal
