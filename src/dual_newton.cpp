@@ -291,6 +291,12 @@ EIGEN_STRONG_INLINE DualNewton::Vector6 DualNewton::pullOf(const Block& block,
   return pull;
 }
 
+// Whether forces, or a pull, leave all components free.
+EIGEN_STRONG_INLINE bool DualNewton::isInside(const Block& block, const Vector6& force) {
+  const double normal = force[kNormal];
+  return normal > 0. && (force.cwiseAbs() - normal * block.reaches).maxCoeff() <= 0.;
+}
+
 // The forces for a pull, as long as the state stays.
 DualNewton::Vector6 DualNewton::respond(const Block& block, const Vector6& pull) {
   return block.is_free.cwiseProduct(pull) +
@@ -316,10 +322,7 @@ bool DualNewton::evaluate() {
   for (const std::size_t slot : active_) {
     Block& block = blocks_[slot];
     block.pull = pullOf(block, multipliers_);
-    const double normal = block.pull[kNormal];
-    const bool inside =
-        normal > 0. && (block.pull.cwiseAbs() - normal * block.reaches).maxCoeff() <= 0.;
-    if (inside)
+    if (isInside(block, block.pull))
       enter(block, block.free);
     else
       withSize(block.cone.size, [&](auto size) { enter(block, findState<size>(block)); });
@@ -435,6 +438,32 @@ bool DualNewton::stepFreely(int steps) {
     if (!changed) return false;
   }
   return false;
+}
+
+// The first step where a sole is on its own: it gives each wrench by one force, x = e⁻¹ times the
+// wrench, and as moments give no force, that is two systems of three equations. Returns false,
+// without a step, if the contact is of another kind, the force is not inside of the cone, or digits
+// were lost.
+bool DualNewton::stepAsSole() {
+  if (active_.size() != 1) return false;
+  Block& block = blocks_[active_.front()];
+  if (!block.has_pure_moments || block.free.bounds != State().bounds) return false;
+  const Eigen::Matrix3d of_force = block.e.topLeftCorner<3, 3>().inverse(),
+                        of_moment = block.e.bottomRightCorner<3, 3>().inverse();
+  const auto lever = block.e.bottomLeftCorner<3, 3>();  // takes forces to moments
+  block.force.head<3>().noalias() = of_force * target_.head<3>();
+  block.force.tail<3>().noalias() = of_moment * (target_.tail<3>() - lever * block.force.head<3>());
+  achieved_.setZero();
+  addWrench(block, block.force, achieved_);
+  if (!isInside(block, block.force) || !isReached(target_, kMissing)) return false;
+
+  block.pull = block.force;  // eᵀ ν
+  multipliers_.tail<3>().noalias() = of_moment.transpose() * block.pull.tail<3>();
+  multipliers_.head<3>().noalias() =
+      of_force.transpose() * (block.pull.head<3>() - lever.transpose() * multipliers_.tail<3>());
+  block.last = block.free;
+  ++iterations_;
+  return true;
 }
 
 // Newton's method with ε, from the multipliers and the state at hand, until the state stays.
@@ -687,7 +716,7 @@ DistributionStatus DualNewton::search(bool from_last_answer) {
   }
   if (!reached) {
     begin(Start::Free);
-    reached = stepFreely(kFreeSteps);
+    reached = stepAsSole() || stepFreely(kFreeSteps);
   }
   if (reached) {
     missing_.setZero();

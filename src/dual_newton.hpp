@@ -153,6 +153,7 @@ class DualNewton {
   static void enter(Block& block, const State& state);
   template <int kSize>
   static State findState(const Block& block);
+  static bool isInside(const Block& block, const Vector6& force);
   static Vector6 respond(const Block& block, const Vector6& pull);
   static Vector6 pullOf(const Block& block, const Vector6& multipliers);
   static void addWrench(const Block& block, const Vector6& force, Vector6& wrench);
@@ -168,6 +169,7 @@ class DualNewton {
   void refine(const Vector6& wrench, double enough);
   bool isFinite() const;
   int stepsTaken() const { return iterations_ - iterations_in_vain_; }
+  bool stepAsSole();
   bool stepFreely(int steps);
   bool stepWithSlack();
   DistributionStatus search(bool from_last_answer);
