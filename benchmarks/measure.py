@@ -108,7 +108,10 @@ def case_rows(executable, regex, quick):
 
 
 def interpolate(walk, rate):
-    """The arrays of a walk at this rate [Hz]; a foot stands as in the frame before."""
+    """The arrays of a walk at this rate [Hz]; a foot stands if it does just before or just after.
+
+    Between these frames the wrench goes over from foot to foot: it takes both.
+    """
     frames = walk["t"]
     t = np.arange(round((frames[-1] - frames[0]) * rate)) / rate + frames[0]
     before = np.searchsorted(frames, t + 1e-9, side="right") - 1
@@ -118,7 +121,8 @@ def interpolate(walk, rate):
     }
     # Frames are so close that a straight line between quaternions is as good as an arc.
     between["q"][:, 3:7] /= np.linalg.norm(between["q"][:, 3:7], axis=1, keepdims=True)
-    return {**between, "contacts": walk["contacts"][before]}
+    after = np.minimum(before + 1, len(frames) - 1)
+    return {**between, "contacts": walk["contacts"][before] | walk["contacts"][after]}
 
 
 def write_walk(rate=None):

@@ -17,7 +17,9 @@ constexpr int kNormal = BoxCone::kNormal;
 // How many steps are taken without ε before those with, and from the state of the last answer.
 constexpr int kFreeSteps = 3;
 constexpr int kFreeStepsFromLast = 2;
-// For how many problems a contact may take no part, so that it begins where it left.
+// For how many problems a contact may take no part, so that it begins where it left. That is for
+// contacts that come and go; where a foot comes down after a step, its state says nothing: in a
+// walk of 50 Hz it costs more steps than it saves, at 1 kHz it makes no difference.
 constexpr std::size_t kShortAbsence = 10;
 // ε, as a part of the mean compliance: less, if the answer that it leads to is none.
 constexpr double kSlacks[] = {1e-3, 1e-4, 1e-6, 1e-8, 1e-11};
@@ -191,7 +193,6 @@ void DualNewton::setContact(std::size_t slot, const Contact& contact) {
 
 void DualNewton::setActive(const std::vector<std::size_t>& slots,
                            const std::vector<Contact>& contacts) {
-  // Where a foot comes down, the state that it was lifted from says nothing.
   for (const std::size_t slot : active_) blocks_[slot].last_problem_number = problem_number_;
   for (const std::size_t slot : slots)
     if (problem_number_ - blocks_[slot].last_problem_number > kShortAbsence)
