@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
     talos.addContact(std::make_shared<dynacom::Contact6D>(sole), side);
   }
   // Nearly all distributions take one iteration. What has no answer after so many gets none.
-  talos.setMaximalIterations(200);
+  talos.setMaximalIterations(50);
 
   // Other parts of the controller need Pinocchio's results, too: they are computed once a tick.
   const pinocchio::Model& model = talos.getModel();

@@ -21,7 +21,7 @@ for side in "left", "right":
     sole.gu = 0.1
     talos.addContact(dynacom.Contact6D(sole), side)
 # Nearly all distributions take one iteration. What has no answer after so many gets none.
-talos.setMaximalIterations(200)
+talos.setMaximalIterations(50)
 
 # Other parts of the controller need Pinocchio's results, too: they are computed once a tick.
 model = talos.getModel()
