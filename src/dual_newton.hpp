@@ -62,12 +62,12 @@ class Factors6 {
 /// are at their bounds, and which contacts bear a load.
 ///
 /// It starts from the state of the last answer, or from none at their bounds, where its first step
-/// is the closed form for forces without inequalities. At first there is no ε: as long as the state
-/// can give all wrenches, a step leads to the multipliers that would be the answer if the state
-/// stayed. Where that does not end, ε > 0 makes steps whose length can be chosen so that the dual
-/// falls. What is found with ε serves to know the state, and no more: the answer follows from it by
-/// linear equations without ε, for both stages, and proves itself. What does not, and what hangs on
-/// the last digits, is left to TwoStageSolver.
+/// is the closed form for forces without inequalities, simpler still for a sole on its own. At
+/// first there is no ε: as long as the state can give all wrenches, a step leads to the multipliers
+/// that would be the answer if the state stayed. Where that does not end, ε > 0 makes steps whose
+/// length can be chosen so that the dual falls. What is found with ε serves to know the state, and
+/// no more: the answer follows from it by linear equations without ε, for both stages, and proves
+/// itself. What does not, and what hangs on the last digits, is left to TwoStageSolver.
 ///
 /// Contacts are known by slot. Nothing is allocated but by reserve().
 class DualNewton {
