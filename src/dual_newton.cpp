@@ -448,7 +448,7 @@ bool DualNewton::stepFreely(int steps) {
 bool DualNewton::stepAsSole() {
   if (active_.size() != 1) return false;
   Block& block = blocks_[active_.front()];
-  if (!block.has_pure_moments || block.free.bounds != State().bounds) return false;
+  if (!block.has_pure_moments || !block.free.hasBounds(State())) return false;
   const Eigen::Matrix3d of_force = block.e.topLeftCorner<3, 3>().inverse(),
                         of_moment = block.e.bottomRightCorner<3, 3>().inverse();
   const auto lever = block.e.bottomLeftCorner<3, 3>();  // takes forces to moments

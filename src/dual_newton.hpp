@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
+#include <cstring>
 #include <optional>
 #include <vector>
 
@@ -115,8 +117,14 @@ class DualNewton {
     bool loaded = false;
     std::array<signed char, 8> bounds = {};  // as many as compare at once
 
+    bool hasBounds(const State& other) const {
+      std::uint64_t mine, others;  // compilers call a function to compare the arrays
+      std::memcpy(&mine, bounds.data(), sizeof mine);
+      std::memcpy(&others, other.bounds.data(), sizeof others);
+      return mine == others;
+    }
     bool operator==(const State& other) const {
-      return loaded == other.loaded && (!loaded || bounds == other.bounds);
+      return loaded == other.loaded && (!loaded || hasBounds(other));
     }
   };
 
