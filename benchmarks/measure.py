@@ -226,7 +226,7 @@ def boundary(regex, quick):
     if not chosen:
         return {"rows": []}
     say("bench_boundary")
-    number, repetitions = (500, 3) if quick else (5000, 5)
+    number, repetitions = (500, 5) if quick else (5000, 9)
     caps = dict.fromkeys(cap for _, cap in chosen)
     lines = run(FOLDER / "bench_boundary", number, repetitions, *caps).splitlines()
     rows, kept = [], []
