@@ -36,14 +36,21 @@
     name.replace(/[&<>]/g, (character) => `&#${character.charCodeAt(0)};`);
 
   const FONT = { family: "system-ui, sans-serif", size: 12, color: "#5f6b76" };
+  const LONGEST = 18; // letters of a name beside a plot
+  const shortened = (name) =>
+    escaped(name.length > LONGEST ? `${name.slice(0, LONGEST - 1)}…` : name);
+  const rowNames = [...data.contacts.map(({ name }) => name), ...data.statuses];
+  const LEFT = 18 + 6.5 * Math.min(Math.max(...rowNames.map((name) => name.length)), LONGEST);
   const AXIS = { zeroline: false, gridcolor: "#eceff2", linecolor: "#dfe3e7", automargin: false };
+  const MARGIN = { l: 0, r: 12, t: 32, b: 28, autoexpand: false }; // above there is a legend
   const CONFIG = { displayModeBar: false, responsive: true, doubleClick: "reset" };
   const first = time[0];
   const last = time[count - 1];
+  const all = last > first ? [first, last] : [first - 0.5, first + 0.5];
   const line = (name, values, color, more = {}) => ({
     x: time,
     y: values,
-    name: escaped(name),
+    name: shortened(name),
     mode: "lines",
     line: { color, width: 1.5, dash: more.dash },
     hovertemplate: "%{y:.3f}",
@@ -53,25 +60,31 @@
   function layout(more = {}) {
     return {
       font: FONT,
-      margin: { l: 64, r: 12, t: 8, b: 28 },
+      margin: { ...MARGIN, l: LEFT, t: more.showlegend === false ? 8 : MARGIN.t },
       hovermode: "x unified",
       hoverlabel: { font: { size: 12 } },
       dragmode: "zoom",
       showlegend: true,
       legend: { orientation: "h", x: 1, xanchor: "right", y: 1, yanchor: "bottom" },
-      xaxis: { ...AXIS, range: [first, last], ticksuffix: " s", hoverformat: ".3f" },
+      xaxis: { ...AXIS, range: [...all], ticksuffix: " s", hoverformat: ".3f" },
       yaxis: { ...AXIS, fixedrange: true, rangemode: "tozero" },
       ...more,
     };
   }
 
   const level = (y, color) => ({
-    type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, layer: "below",
+    type: "line",
+    xref: "paper",
+    x0: 0,
+    x1: 1,
+    y0: y,
+    y1: y,
+    layer: "below",
     line: { color, width: 1, dash: "dot" },
   });
 
   function drawForces() {
-    const traces = [line("needed in all", column("needed"), "#9aa5af")];
+    const traces = [line("needed", column("needed"), "#9aa5af")];
     data.contacts.forEach(({ name, color, measured }, index) => {
       traces.push(line(name, column(`${index}.force`), color));
       if (measured) {
@@ -105,7 +118,7 @@
     ];
   }
 
-  // First and last time, and first and last frame, of each stretch in which a test holds.
+  // The first and the last frame of each stretch in which something holds.
   function stretches(holds) {
     const found = [];
     for (let frame = 0; frame < count; frame++) {
@@ -136,14 +149,15 @@
       y: found.map(() => row),
       width: 0.6,
       marker: { color },
-      customdata: found.map(([start, end]) => [time[start], time[end]]),
-      hovertemplate: `${escaped(name)}: %{customdata[0]:.3f} to %{customdata[1]:.3f} s<extra></extra>`,
+      customdata: found.map(([start, end]) => [time[start], time[end], escaped(name)]),
+      hovertemplate:
+        "%{customdata[2]}: %{customdata[0]:.3f} to %{customdata[1]:.3f} s<extra></extra>",
     }));
     const yaxis = {
       ...AXIS,
       fixedrange: true,
       tickvals: rows.map((_, row) => row),
-      ticktext: rows.map(([name]) => escaped(name.length > 9 ? `${name.slice(0, 8)}…` : name)),
+      ticktext: rows.map(([name]) => shortened(name)),
       range: [rows.length - 0.5, -0.5],
     };
     element("schedule").style.height = `${44 + 24 * rows.length}px`;
@@ -187,11 +201,11 @@
     return around.length > 0 ? [...around, around[0]] : sorted.slice(0, 1);
   }
 
-  const top = element("top");
+  const above = element("above");
   const POINTS = { com: "CoM", cop: "CoP", vrp: "VRP" };
   const NOW = data.contacts.length + 3; // the first of the traces that show one frame
 
-  function drawTop() {
+  function drawAbove() {
     const traces = data.contacts.map(({ name, color, corners: sides }, index) => {
       // Where it stood: in the middle of every stretch in which it is active.
       const x = [];
@@ -206,7 +220,8 @@
         y.push(null);
       }
       return {
-        x, y,
+        x,
+        y,
         name: escaped(name),
         mode: sides > 1 ? "lines" : "markers",
         line: { color, width: 1 },
@@ -214,34 +229,57 @@
         fill: sides > 1 ? "toself" : "none",
         fillcolor: `${color}14`,
         hoverinfo: "name",
+        showlegend: false,
       };
     });
     for (const [name, title] of Object.entries(POINTS)) {
       const [x, y] = path(name);
       traces.push({
-        x, y,
+        x,
+        y,
         name: title,
         mode: "lines",
-        line: { color: data.colors[name], width: 1.2 },
-        opacity: 0.6,
+        line: { color: data.colors[name], width: 1 },
+        opacity: 0.3,
         hovertemplate: "%{x:.3f}, %{y:.3f}",
+        legendgroup: name,
+        showlegend: false,
       });
     }
+    const empty = { x: [], y: [], hoverinfo: "skip" };
     traces.push({
-      x: [], y: [], mode: "lines", fill: "toself", line: { color: "#b59f00", width: 1.5 },
-      fillcolor: `${data.colors.support}66`, showlegend: false, hoverinfo: "skip",
+      ...empty,
+      mode: "lines",
+      line: { color: "#b59f00", width: 1.5 },
+      fill: "toself",
+      fillcolor: `${data.colors.support}66`,
+      showlegend: false,
     });
-    for (const name of Object.keys(POINTS))
-      traces.push({
-        x: [], y: [], mode: "markers", showlegend: false, hoverinfo: "skip",
-        marker: { color: data.colors[name], size: 11, line: { color: "#fff", width: 1.5 } },
-      });
+    for (const [name, title] of Object.entries(POINTS)) {
+      const color = data.colors[name];
+      traces.push(
+        {
+          ...empty,
+          mode: "lines",
+          line: { color, width: 2 },
+          legendgroup: name,
+          showlegend: false,
+        },
+        {
+          ...empty,
+          name: title,
+          mode: "markers",
+          marker: { color, size: 11, line: { color: "#fff", width: 1.5 } },
+          legendgroup: name,
+        },
+      );
+    }
     return [
       traces,
       layout({
         hovermode: "closest",
         dragmode: "pan",
-        margin: { l: 48, r: 8, t: 8, b: 28 },
+        margin: { ...MARGIN, l: 48 },
         xaxis: { ...AXIS, ...range(0), scaleanchor: "y" },
         yaxis: { ...AXIS, ...range(1) },
       }),
@@ -264,21 +302,22 @@
     return { range: [low - margin, high + margin] };
   }
 
-  function showTop(frame) {
+  function showAbove(frame) {
     const support = hull(standing(frame).flatMap((index) => corners(index, frame)));
     const x = [support.map((point) => point[0])];
     const y = [support.map((point) => point[1])];
+    const [from, to] = [-0.5, 0.5].map((later) => nearest(time, time[frame] + later));
     for (const name of Object.keys(POINTS)) {
       const [xs, ys] = path(name);
-      x.push([xs[frame]]);
-      y.push([ys[frame]]);
+      x.push(xs.slice(from, to + 1), [xs[frame]]);
+      y.push(ys.slice(from, to + 1), [ys[frame]]);
     }
-    return Plotly.restyle(top, { x, y }, [NOW, NOW + 1, NOW + 2, NOW + 3]);
+    return Plotly.restyle(above, { x, y }, x.map((_, index) => NOW + index));
   }
 
   await Promise.all([
     ...plots.map((plot, index) => Plotly.newPlot(plot, ...drawings[index], CONFIG)),
-    Plotly.newPlot(top, ...drawTop(), { ...CONFIG, scrollZoom: true }),
+    Plotly.newPlot(above, ...drawAbove(), { ...CONFIG, scrollZoom: true }),
   ]);
   document.querySelectorAll(".measured").forEach((text) => {
     text.hidden = !data.contacts.some(({ measured }) => measured);
@@ -348,13 +387,15 @@
     if (awaited) return;
     awaited = true;
     requestAnimationFrame(async () => {
+      const shown = now;
       showCursors();
-      slider.value = now;
-      const status = data.statuses[column("status")[now]];
-      element("clock").textContent = `${time[now].toFixed(3)} s · frame ${now} · ${status}`;
-      scene.show(now);
-      await showTop(now);
+      slider.value = shown;
+      const status = data.statuses[column("status")[shown]];
+      element("clock").textContent = `${time[shown].toFixed(3)} s · frame ${shown} · ${status}`;
+      scene.show(shown);
+      await showAbove(shown);
       awaited = false;
+      if (now !== shown) go(now);
     });
   }
   const goTo = (seconds) => go(nearest(time, seconds));
@@ -371,36 +412,58 @@
     });
   }
 
-  let zoomed = [first, last];
+  let zoomed = all;
+  let firstOnPath = 0;
   function zoom(range) {
     if (range[0] === zoomed[0] && range[1] === zoomed[1]) return;
     zoomed = range;
     for (const plot of plots) Plotly.relayout(plot, { "xaxis.range": [...range] });
     const [from, to] = [nearest(time, range[0]), nearest(time, range[1]) + 1];
+    firstOnPath = from;
     const part = Object.keys(POINTS).map((name) => path(name).map((list) => list.slice(from, to)));
     const [x, y] = [0, 1].map((axis) => part.map((lists) => lists[axis]));
-    Plotly.restyle(top, { x, y }, [NOW - 3, NOW - 2, NOW - 1]);
+    Plotly.restyle(above, { x, y }, [NOW - 3, NOW - 2, NOW - 1]);
     showCursors();
   }
 
-  for (const plot of plots) {
-    plot.on("plotly_relayout", () => zoom(plot.layout.xaxis.range));
-    const point = (event) => {
-      const [{ data: trace, pointNumber, x }] = event.points;
-      return trace.type === "bar" ? trace.base[pointNumber] : x;
-    };
-    plot.on("plotly_hover", (event) => playing || goTo(point(event)));
+  // frame: of what was pointed at, undefined where that is of no time.
+  function follow(plot, frame) {
+    const visit = ({ points: [point] }) => go(frame(point) ?? now);
+    plot.on("plotly_hover", (event) => playing || visit(event));
     plot.on("plotly_click", (event) => {
       pause();
-      goTo(point(event));
+      visit(event);
     });
   }
+  for (const plot of plots) {
+    plot.on("plotly_relayout", () => zoom(plot.layout.xaxis.range));
+    follow(plot, ({ data: trace, pointNumber, x }) =>
+      nearest(time, trace.type === "bar" ? trace.customdata[pointNumber][0] : x),
+    );
+  }
+  follow(above, ({ curveNumber, pointNumber }) =>
+    curveNumber < data.contacts.length ? undefined : firstOnPath + pointNumber,
+  );
   window.addEventListener("resize", () => requestAnimationFrame(showCursors));
 
+  // On paper, plots are as wide as that; the scene stays as it is, for it would be drawn too late.
+  function fit(onPaper) {
+    const frame = element("scene");
+    frame.style.width = onPaper ? `${frame.clientWidth}px` : "";
+    document.body.classList.toggle("paper", onPaper);
+    for (const plot of [above, ...plots])
+      Plotly.relayout(plot, onPaper ? { width: plot.clientWidth } : { width: null, autosize: true });
+    showCursors();
+  }
+  window.addEventListener("beforeprint", () => fit(true));
+  window.addEventListener("afterprint", () => fit(false));
+
   document.querySelectorAll(".reasons tbody tr").forEach((row) => {
+    const button = row.querySelector("button");
+    if (button === null) return;
     row.addEventListener("click", () => {
       pause();
-      goTo(Number(row.querySelector("button").dataset.time));
+      goTo(Number(button.dataset.time));
       document.querySelector(".pair").scrollIntoView({ block: "nearest", behavior: "smooth" });
     });
   });
@@ -440,10 +503,13 @@
   const toggle = () => (playing ? pause() : play());
 
   function onKey(event) {
-    if (event.target.closest("select, button, summary")) return;
     const steps = { ArrowLeft: -1, ArrowRight: 1 };
-    if (event.code === "Space") toggle();
-    else if (event.code in steps) {
+    // Which mean something of their own to these.
+    if (event.target.closest("select, input:not([type=range])")) return;
+    if (event.code === "Space") {
+      if (event.target.closest("button, summary")) return;
+      toggle();
+    } else if (event.code in steps) {
       pause();
       go(now + steps[event.code]);
     } else return;

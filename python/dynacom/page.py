@@ -78,6 +78,7 @@ def write_page(
         contacts=_contacts(robot, arrays, summary),
         sensitivity=_sensitivity(summary),
         measured=_measured(summary),
+        key=_key(robot),
         scene_class="" if recording else "none",
         data=_json(data),
         # One row a column, the time in double precision.
@@ -88,7 +89,8 @@ def write_page(
         scene="" if recording is None else _pack(recording.html.encode()),
         plotly=_pack(plotly.encode()),
     )
-    Path(path).write_text(page, encoding="utf-8")
+    # Names of files may hold what is no text.
+    Path(path).write_text(page, encoding="utf-8", errors="replace")
 
 
 def _plotly() -> str:
@@ -178,19 +180,20 @@ def _number(value: float | None, unit: str = "", digits: int = 3) -> str:
     if "e" in text:
         mantissa, exponent = text.split("e")
         text = f"{mantissa}·10<sup>{int(exponent)}</sup>"
-    # The space does not break.
-    return text.replace("-", "−") + (f" {escape(unit)}" if unit else "")
+    return text.replace("-", "−") + (f"&nbsp;{escape(unit)}" if unit else "")
 
 
 def _percent(share: float) -> str:
     if 0.0 < share < 0.001:
-        return "&lt; 0.1 %"
-    return f"{100.0 * share:.1f} %"
+        return "&lt;&nbsp;0.1&nbsp;%"
+    return f"{100.0 * share:.1f}&nbsp;%"
 
 
-def _moment(time: float) -> str:
+def _moment(time: float | None) -> str:
     """A time that one can go to."""
-    return f'<button type="button" class="time" data-time="{time!r}">{time:.2f} s</button>'
+    if time is None:
+        return "–"
+    return f'<button type="button" class="time" data-time="{time!r}">{time:.2f}&nbsp;s</button>'
 
 
 def _table(titles: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
@@ -261,7 +264,20 @@ def _notes(notes: Sequence[str]) -> str:
     if not notes:
         return ""
     items = "".join(f"<li>{escape(note)}</li>" for note in notes)
-    return f"<section class='notes'><h2>Notes</h2><ul>{items}</ul></section>"
+    return f"<ul class='notes'>{items}</ul>"
+
+
+def _dot(color: tuple[int, int, int]) -> str:
+    return f'<i style="background: {_css(color)}"></i>'
+
+
+def _key(robot: Robot) -> str:
+    """What the scene's colours mean."""
+    points = {"com": "CoM", "cop": "CoP", "vrp": "VRP", "support": "support"}
+    colors = {title: scene.COLORS[name] for name, title in points.items()}
+    for number, name in enumerate(robot.contacts):
+        colors[f"force on {name}"] = scene.contact_color(number)
+    return "".join(f"<span>{_dot(color)} {escape(text)}</span>" for text, color in colors.items())
 
 
 def _contacts(robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[str, Any]) -> str:
@@ -271,7 +287,7 @@ def _contacts(robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[s
         friction = arrays[f"contact.{name}.friction_usage"]
         rows.append(
             (
-                f'<i style="background: {_css(scene.contact_color(number))}"></i> {escape(name)}',
+                f"{_dot(scene.contact_color(number))} {escape(name)}",
                 _percent(contact["active_share"]),
                 _percent(contact["weight_share"]),
                 _number(contact["largest_vertical_force"], "m g"),

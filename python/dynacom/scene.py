@@ -8,7 +8,7 @@ import contextlib
 import io
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -26,7 +26,7 @@ COLORS = {"com": (30, 30, 30), "cop": (213, 94, 0), "vrp": (0, 114, 178), "suppo
 CONTACT_COLORS = ((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 
 # More frames than these make pages that are too large, and too slow to go back in.
-_MOST_FRAMES = 1500
+_MOST_FRAMES = 900
 
 _WORLD = "/world"
 
@@ -88,16 +88,19 @@ def record(
     Raises:
         DynacomError: viser is not installed.
     """
-    frames = _thin(arrays["time"], rate)
+    # Those, too, that a reason leads to.
+    worst = [reason["time"] for reason in summary["reasons"] if reason["time"] is not None]
+    frames = np.union1d(_thin(arrays["time"], rate), closest_frames(arrays["time"], worst))
     times = arrays["time"][frames] - arrays["time"][0]
     with _server(_import_viser(), port=0) as server:
         scene = Scene(server, robot, q, arrays, summary)
         recorder = server.get_scene_serializer()
         # The last frame stays for as long as the others.
         pauses = np.diff(times, append=times[-1] + 1.0 / rate)
-        for frame, pause in zip(frames, pauses, strict=True):
-            scene.show(frame)
-            recorder.insert_sleep(float(pause))
+        with server.atomic():  # nobody waits for single changes
+            for frame, pause in zip(frames, pauses, strict=True):
+                scene.show(frame)
+                recorder.insert_sleep(float(pause))
         return Recording(recorder.as_html(), times, scene.note)
 
 
@@ -111,7 +114,9 @@ def show(
     stop: threading.Event | None = None,
     port: int = 8080,
 ) -> None:
-    """Shows a motion's scene in a browser, with buttons to play it, until it is stopped.
+    """Shows a motion's scene to a browser on this machine, with buttons to play it.
+
+    Returns when it is stopped, or interrupted.
 
     Args:
         q, arrays, summary: as for :func:`record`.
@@ -124,29 +129,48 @@ def show(
     """
     stop = threading.Event() if stop is None else stop
     clock = arrays["time"] - arrays["time"][0]
-    duration = float(clock[-1])
     with _server(_import_viser(), port) as server:
         scene = Scene(server, robot, q, arrays, summary)
-        server.gui.configure_theme(show_logo=False, show_share_button=False)
-        playing = server.gui.add_checkbox("Play", True)
-        slider = server.gui.add_slider("Time [s]", 0.0, max(duration, 1e-3), 1e-3, 0.0)
-        speed = server.gui.add_dropdown("Speed", ("0.1", "0.25", "0.5", "1", "2"), "1")
-        status = server.gui.add_text("Status", "", disabled=True)
-        server.gui.add_button("Stop").on_click(lambda _: stop.set())
+        controls = _Controls(server, float(clock[-1]), stop)
         announce(f"http://{server.get_host()}:{server.get_port()}")
+        shown = 0
+        with contextlib.suppress(KeyboardInterrupt):
+            while not stop.wait(1.0 / 60.0):
+                frame = int(closest_frames(clock, [controls.advance()])[0])
+                if frame != shown:
+                    with server.atomic():
+                        scene.show(frame)
+                    shown = frame
+                controls.status.value = str(arrays["status"][frame])
 
-        shown, before = -1, time.monotonic()
-        while not stop.wait(1.0 / 60.0):
-            now = time.monotonic()
-            if playing.value and duration > 0.0:
-                slider.value = (slider.value + (now - before) * float(speed.value)) % duration
-            before = now
-            frame = int(np.abs(clock - slider.value).argmin())
-            if frame != shown:
-                with server.atomic():
-                    scene.show(frame)
-                status.value = str(arrays["status"][frame])
-                shown = frame
+
+class _Controls:
+    """What one plays a motion with."""
+
+    def __init__(self, server: Any, duration: float, stop: threading.Event) -> None:
+        gui = server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        self._duration = max(duration, 1e-3)  # a slider needs a length
+        self._playing = gui.add_checkbox("Play", True)
+        self._time = gui.add_slider("Time [s]", 0.0, self._duration, 1e-3, 0.0)
+        self._speed = gui.add_dropdown("Speed", ("0.1", "0.25", "0.5", "1", "2"), "1")
+        self.status = gui.add_text("Status", "", disabled=True)
+        gui.add_button("Stop").on_click(lambda _: stop.set())
+        self._time.on_update(self._pause)
+        self._before = time.monotonic()
+
+    def _pause(self, event: Any) -> None:
+        if event.client is not None:  # else it was advance()
+            self._playing.value = False
+
+    def advance(self) -> float:
+        """The time to show [s], which goes on where it plays."""
+        now = time.monotonic()
+        if self._playing.value:
+            step = (now - self._before) * float(self._speed.value)
+            self._time.value = (self._time.value + step) % self._duration
+        self._before = now
+        return self._time.value
 
 
 class Scene:
@@ -237,17 +261,23 @@ class Scene:
                 "tij,tj->ti", rotation[:, :, :2], place
             )
             # A slash would make levels in the scene's tree.
-            path = f"{_WORLD}/forces/{number} {name.replace('/', '_')}"
+            shown = "".join(c if c.isprintable() and c != "/" else "_" for c in name)
+            path = f"{_WORLD}/forces/{number} {shown}"
             force = np.einsum("tij,tj->ti", rotation, self._arrays[f"{key}.force"])
-            yield self._arrow(path, color, start, force)
+            yield self._arrow(path, color, 1.0, start, force)
             measured = self._arrays.get(f"{key}.measured_force")
             if measured is not None:
                 force = np.einsum("tij,tj->ti", rotation, measured)
                 pale = tuple(int(127 + value / 2) for value in color)
-                yield self._arrow(f"{path}, measured", pale, start, force)
+                yield self._arrow(f"{path}, measured", pale, 0.6, start, force)
 
     def _arrow(
-        self, path: str, color: tuple[int, ...], start: np.ndarray, force: np.ndarray
+        self,
+        path: str,
+        color: tuple[int, ...],
+        thickness: float,
+        start: np.ndarray,
+        force: np.ndarray,
     ) -> Callable[[int], None]:
         vector = self._length_per_newton * np.nan_to_num(force)
         # To the millimetre, so that what does not move is not sent.
@@ -257,8 +287,8 @@ class Scene:
             path,
             points[:1],
             color,
-            shaft_radius=0.016 * self._height,
-            head_radius=0.04 * self._height,
+            shaft_radius=0.02 * thickness * self._height,
+            head_radius=0.05 * thickness * self._height,
             head_length=float(head[0]),
         )
 
@@ -308,7 +338,9 @@ class Scene:
         hull = convex_hull(corners[:, :2])
         height = corners[:, 2].min() + 0.002
         # Always as many corners: the last ones fall together.
-        hull = np.concatenate([hull, np.repeat(hull[-1:], len(self._support.vertices) - len(hull), 0)])
+        hull = np.concatenate(
+            [hull, np.repeat(hull[-1:], len(self._support.vertices) - len(hull), 0)]
+        )
         hull = np.column_stack([hull, np.full(len(hull), height)]).round(3)
         self._support.vertices = hull
         self._border.points = np.stack([hull, np.roll(hull, -1, axis=0)], axis=1)
@@ -342,16 +374,21 @@ def _thin(time: np.ndarray, rate: float) -> np.ndarray:
     count = min(int(duration * rate) + 1, _MOST_FRAMES)
     if count >= len(time):
         return np.arange(len(time))
-    wanted = np.linspace(time[0], time[-1], count)
+    return np.unique(closest_frames(time, np.linspace(time[0], time[-1], count)))
+
+
+def closest_frames(time: np.ndarray, wanted: Sequence[float]) -> np.ndarray:
+    """The frames that are the closest to some times."""
+    wanted = np.asarray(wanted, dtype=float)
     after = np.searchsorted(time, wanted).clip(1, len(time) - 1)
     closer = wanted - time[after - 1] < time[after] - wanted
-    return np.unique(after - closer)
+    return after - closer
 
 
 def _centre(time: np.ndarray, com: np.ndarray, height: float) -> np.ndarray:
-    """What the camera looks at, (T, 2): the middle of the motion, or, where it is a long way, the CoM.
+    """What the camera looks at, (T, 2): the motion's middle, or the CoM where that goes far.
 
-    Of the latter a mean of two seconds: the camera shall not tremble.
+    Of the CoM a mean over two seconds: the camera shall not tremble.
     """
     com = np.nan_to_num(com)
     if (np.ptp(com, axis=0) < 2.0 * height).all():
