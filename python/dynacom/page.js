@@ -9,7 +9,9 @@
 
   async function unpack(id) {
     const text = atob(element(id).textContent);
-    const bytes = Uint8Array.from(text, (character) => character.charCodeAt(0));
+    element(id).remove(); // there are megabytes of it
+    const bytes = new Uint8Array(text.length);
+    for (let index = 0; index < text.length; index++) bytes[index] = text.charCodeAt(index);
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     return new Response(stream).arrayBuffer();
   }
@@ -135,10 +137,10 @@
     const rows = data.contacts.map(({ name, color }, index) => [
       name, color, stretches((frame) => column(`${index}.active`)[frame] > 0),
     ]);
-    const colors = ["#b3261e", "#e69f00", "#6b4fa0", "#5f6b76"];
-    data.statuses.filter((name) => name !== "Solved").forEach((name, index) => {
-      const code = data.statuses.indexOf(name);
-      rows.push([name, colors[index], stretches((frame) => status[frame] === code)]);
+    const colors = new Map([["Solved", null], ["Relaxed", "#7a5195"], ["NoContact", "#b3261e"]]);
+    data.statuses.forEach((name, code) => {
+      const color = colors.has(name) ? colors.get(name) : "#5f6b76";
+      if (color !== null) rows.push([name, color, stretches((frame) => status[frame] === code)]);
     });
     const half = count > 1 ? (last - first) / (count - 1) / 2 : 0.5;
     const traces = rows.map(([name, color, found], row) => ({
@@ -172,7 +174,20 @@
 
   // ---- From above ----
 
+  const above = element("above");
+  const POINTS = { com: "CoM", cop: "CoP", vrp: "VRP" };
+  const NOW = data.contacts.length + 3; // the first of the traces that show one frame
+
   const path = (name) => [column(`${name}_x`), column(`${name}_y`)];
+  // The faint paths, which are drawn anew at every step: of some frames, where there are many.
+  const FAINT = 5000;
+  let faint = { from: 0, step: 1 };
+  function faintPaths(from, to) {
+    faint = { from, step: Math.ceil((to - from) / FAINT) };
+    const thin = (list) => list.slice(from, to).filter((_, index) => index % faint.step === 0);
+    const thinned = Object.keys(POINTS).map((name) => path(name).map(thin));
+    return [0, 1].map((axis) => thinned.map((lists) => lists[axis]));
+  }
   const corners = (index, frame) => {
     const found = [];
     for (let corner = 0; corner < data.contacts[index].corners; corner++)
@@ -201,10 +216,6 @@
     return around.length > 0 ? [...around, around[0]] : sorted.slice(0, 1);
   }
 
-  const above = element("above");
-  const POINTS = { com: "CoM", cop: "CoP", vrp: "VRP" };
-  const NOW = data.contacts.length + 3; // the first of the traces that show one frame
-
   function drawAbove() {
     const traces = data.contacts.map(({ name, color, corners: sides }, index) => {
       // Where it stood: in the middle of every stretch in which it is active.
@@ -232,11 +243,11 @@
         showlegend: false,
       };
     });
-    for (const [name, title] of Object.entries(POINTS)) {
-      const [x, y] = path(name);
+    const [xs, ys] = faintPaths(0, count);
+    Object.entries(POINTS).forEach(([name, title], index) => {
       traces.push({
-        x,
-        y,
+        x: xs[index],
+        y: ys[index],
         name: title,
         mode: "lines",
         line: { color: data.colors[name], width: 1 },
@@ -245,7 +256,7 @@
         legendgroup: name,
         showlegend: false,
       });
-    }
+    });
     const empty = { x: [], y: [], hoverinfo: "skip" };
     traces.push({
       ...empty,
@@ -319,9 +330,6 @@
     ...plots.map((plot, index) => Plotly.newPlot(plot, ...drawings[index], CONFIG)),
     Plotly.newPlot(above, ...drawAbove(), { ...CONFIG, scrollZoom: true }),
   ]);
-  document.querySelectorAll(".measured").forEach((text) => {
-    text.hidden = !data.contacts.some(({ measured }) => measured);
-  });
 
   // ---- The scene ----
 
@@ -413,15 +421,11 @@
   }
 
   let zoomed = all;
-  let firstOnPath = 0;
   function zoom(range) {
     if (range[0] === zoomed[0] && range[1] === zoomed[1]) return;
     zoomed = range;
     for (const plot of plots) Plotly.relayout(plot, { "xaxis.range": [...range] });
-    const [from, to] = [nearest(time, range[0]), nearest(time, range[1]) + 1];
-    firstOnPath = from;
-    const part = Object.keys(POINTS).map((name) => path(name).map((list) => list.slice(from, to)));
-    const [x, y] = [0, 1].map((axis) => part.map((lists) => lists[axis]));
+    const [x, y] = faintPaths(nearest(time, range[0]), nearest(time, range[1]) + 1);
     Plotly.restyle(above, { x, y }, [NOW - 3, NOW - 2, NOW - 1]);
     showCursors();
   }
@@ -442,7 +446,7 @@
     );
   }
   follow(above, ({ curveNumber, pointNumber }) =>
-    curveNumber < data.contacts.length ? undefined : firstOnPath + pointNumber,
+    curveNumber < data.contacts.length ? undefined : faint.from + faint.step * pointNumber,
   );
   window.addEventListener("resize", () => requestAnimationFrame(showCursors));
 

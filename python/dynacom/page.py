@@ -79,6 +79,7 @@ def write_page(
         sensitivity=_sensitivity(summary),
         measured=_measured(summary),
         key=_key(robot),
+        dashed="; dashed: the file's" if summary["measured"] else "",
         scene_class="" if recording else "none",
         data=_json(data),
         # One row a column, the time in double precision.

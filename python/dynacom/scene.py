@@ -153,7 +153,7 @@ class _Controls:
         self._duration = max(duration, 1e-3)  # a slider needs a length
         self._playing = gui.add_checkbox("Play", True)
         self._time = gui.add_slider("Time [s]", 0.0, self._duration, 1e-3, 0.0)
-        self._speed = gui.add_dropdown("Speed", ("0.1", "0.25", "0.5", "1", "2"), "1")
+        self._speed = gui.add_dropdown("Speed", ("0.1", "0.25", "0.5", "1", "2"), initial_value="1")
         self.status = gui.add_text("Status", "", disabled=True)
         gui.add_button("Stop").on_click(lambda _: stop.set())
         self._time.on_update(self._pause)
@@ -380,9 +380,9 @@ def _thin(time: np.ndarray, rate: float) -> np.ndarray:
 def closest_frames(time: np.ndarray, wanted: Sequence[float]) -> np.ndarray:
     """The frames that are the closest to some times."""
     wanted = np.asarray(wanted, dtype=float)
-    after = np.searchsorted(time, wanted).clip(1, len(time) - 1)
-    closer = wanted - time[after - 1] < time[after] - wanted
-    return after - closer
+    after = np.searchsorted(time, wanted).clip(max=len(time) - 1)
+    before = (after - 1).clip(min=0)
+    return np.where(wanted - time[before] < time[after] - wanted, before, after)
 
 
 def _centre(time: np.ndarray, com: np.ndarray, height: float) -> np.ndarray:
