@@ -297,7 +297,7 @@
     ];
   }
 
-  // What holds the soles and the CoM; CoP and VRP may be anywhere.
+  // What holds the soles and the CoM, and CoP and VRP where they are not far off.
   function range(axis) {
     let [low, high] = [Infinity, -Infinity];
     const extend = (value) => {
@@ -309,6 +309,10 @@
     for (let frame = 0; frame < count; frame++)
       for (const index of standing(frame))
         for (const point of corners(index, frame)) extend(point[axis]);
+    const reach = 0.1 + 0.2 * (high - low);
+    const [least, most] = [low - reach, high + reach];
+    for (const name of ["cop", "vrp"])
+      path(name)[axis].forEach((value) => extend(Math.min(Math.max(value, least), most)));
     const margin = 0.05 + 0.05 * (high - low);
     return { range: [low - margin, high + margin] };
   }

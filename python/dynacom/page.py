@@ -236,9 +236,9 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     if held:
         parts.append(_reasons(held))
     if others:
-        plural = "checks do" if len(others) > 1 else "check does"
+        plural = "reasons do" if len(others) > 1 else "reason does"
         parts += [
-            f"<details><summary>{len(others)} {plural} not object</summary>",
+            f"<details><summary>{len(others)} {plural} not hold</summary>",
             _reasons(others),
             "</details>",
         ]

@@ -215,7 +215,7 @@ class Scene:
             shadow_opacity=0.2,
             position=(0.0, 0.0, self._ground),
         )
-        self._aim_camera(server, q[0])
+        self._aim_camera(server, robot.model, q[0])
         self._robot, self.note = _draw_robot(server, robot)
         self._forces = list(self._draw_forces(robot))
         self._draw_points()
@@ -237,17 +237,21 @@ class Scene:
                 ball.position = (*point, self._ground)
         self._show_support(frame)
 
-    def _aim_camera(self, server: Any, q: np.ndarray) -> None:
-        """From the front, a little to the side, as high as the CoM."""
+    def _aim_camera(self, server: Any, model: pin.Model, q: np.ndarray) -> None:
+        """From the front, a little to the side, and from above."""
+        data = model.createData()
+        pin.forwardKinematics(model, data, q)
+        joints = np.array([placement.translation for placement in data.oMi[1:]])
+        size = max(self._height, 0.7 * float(np.linalg.norm(np.ptp(joints[:, :2], axis=0))))
         x, y, z, w = q[3:7]
         yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)) - 0.7
         camera = server.initial_camera
         camera.fov = 0.7
         camera.look_at = (0.0, 0.0, self._ground + 0.85 * self._height)
         camera.position = (
-            3.1 * self._height * np.cos(yaw),
-            3.1 * self._height * np.sin(yaw),
-            self._ground + 1.7 * self._height,
+            3.1 * size * np.cos(yaw),
+            3.1 * size * np.sin(yaw),
+            self._ground + 0.85 * self._height + 0.85 * size,
         )
 
     def _draw_forces(self, robot: Robot) -> Iterator[Callable[[int], None]]:
@@ -412,6 +416,7 @@ def _draw_robot(server: Any, robot: Robot) -> tuple[Callable[[np.ndarray], None]
         )
         for visual in visuals.geometryObjects:
             visual.meshColor = np.array([*visual.meshColor[:3], 0.4])
+        turn_upright(robot.model, visuals)
         if len(visuals.geometryObjects) > 0:
             return _draw_meshes(server, robot, visuals), None
         note = f"{robot.urdf.name} has no visuals: the robot is drawn as lines."
@@ -419,6 +424,36 @@ def _draw_robot(server: Any, robot: Robot) -> tuple[Callable[[np.ndarray], None]
         reason = DynacomError(str(error) or type(error).__name__)
         note = f"The robot is drawn as lines: its meshes cannot be read ({reason})"
     return _draw_skeleton(server, robot), note
+
+
+def turn_upright(model: pin.Model, visuals: pin.GeometryModel) -> None:
+    """Turns meshes whose files say that y is up, if that is what the URDF expects.
+
+    COLLADA means by it that z becomes what was y; many programs, Pinocchio among them, do not turn
+    anything, and URDFs are made for either. Right is what brings meshes closer to the next joints.
+    """
+    upright = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2.0, 0.0, 0.0), np.zeros(3))
+    tilted = [visual for visual in visuals.geometryObjects if _has_y_up(visual.meshPath)]
+    gaps = np.zeros(2)
+    for visual in tilted:
+        visual.geometry.computeLocalAABB()
+        box = visual.geometry.aabb_local
+        joints = [j for j in range(1, model.njoints) if model.parents[j] == visual.parentJoint]
+        for option, placement in enumerate((visual.placement, visual.placement * upright)):
+            for joint in joints:
+                place = placement.actInv(model.jointPlacements[joint].translation)
+                outside = np.maximum(box.min_ - place, place - box.max_).clip(min=0.0)
+                gaps[option] += np.linalg.norm(outside)
+    if gaps[1] < gaps[0]:
+        for visual in tilted:
+            visual.placement = visual.placement * upright
+
+
+def _has_y_up(path: str) -> bool:
+    if not path.lower().endswith(".dae"):
+        return False
+    with open(path, "rb") as file:
+        return b"<up_axis>Y_UP" in file.read(10000)  # it is in the file's first element
 
 
 def _draw_meshes(server: Any, robot: Robot, visuals: pin.GeometryModel) -> Any:

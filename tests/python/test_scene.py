@@ -243,6 +243,50 @@ def test_camera_follows_a_long_way(talos, walk):
             assert_allclose(arrays["com"][frame, :2] + offset[:2], 0.0, atol=0.1)
 
 
+def visuals_of(urdf: str) -> tuple[pin.Model, pin.GeometryModel]:
+    path = str(robots_folder() / urdf)
+    model = pin.buildModelFromUrdf(path, pin.JointModelFreeFlyer())
+    folders = [str(robots_folder().parents[1])]
+    return model, pin.buildGeomFromUrdf(model, path, pin.GeometryType.VISUAL, package_dirs=folders)
+
+
+def test_meshes_with_y_up():
+    """iCub's legs, whose meshes' files say so and mean it, are as long as from joint to joint."""
+    model, visuals = visuals_of("icub_description/robots/icub.urdf")
+    scene.turn_upright(model, visuals)
+    data, placements = model.createData(), visuals.createData()
+    pin.updateGeometryPlacements(model, data, visuals, placements, pin.neutral(model))
+    for link, upper, lower in (
+        ("upper_leg", "hip_yaw", "knee"),
+        ("lower_leg", "knee", "ankle_pitch"),
+    ):
+        number = visuals.getGeometryId(f"l_{link}_0")
+        geometry = visuals.geometryObjects[number].geometry
+        geometry.computeLocalAABB()
+        corners = np.array([geometry.aabb_local.min_, geometry.aabb_local.max_])
+        heights = [placements.oMg[number].act(corner)[2] for corner in corners]
+        joints = [
+            data.oMi[model.getJointId(f"l_{joint}")].translation[2] for joint in (upper, lower)
+        ]
+        assert min(heights) <= min(joints) + 0.01
+        assert max(heights) >= max(joints) - 0.01
+
+
+@pytest.mark.parametrize(
+    "urdf",
+    [
+        "borinot_description/urdf/borinot_flying_arm_2.urdf",
+        "anymal_c_simple_description/urdf/anymal.urdf",
+    ],
+)
+def test_meshes_that_stay(urdf):
+    """Those of the one say so, too, but are not meant to be turned; the other's do not."""
+    model, visuals = visuals_of(urdf)
+    before = [visual.placement.copy() for visual in visuals.geometryObjects]
+    scene.turn_upright(model, visuals)
+    assert [visual.placement for visual in visuals.geometryObjects] == before
+
+
 # ---- Robots without meshes ----
 
 
