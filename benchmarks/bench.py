@@ -46,13 +46,15 @@ def main():
         part, result = "jitter", measure.jitter(arguments.jitter)
         print(page.jitter_conditions(result), page.jitter_table(result), sep="\n")
     else:
-        default = "|".join(map(re.escape, page.GOALS)) if arguments.counts else ""
+        default = "|".join(map(re.escape, page.GOAL_TABLE)) if arguments.counts else ""
         regex = arguments.regex or re.compile(default)
         part = "counts" if arguments.counts else "times"
         result = getattr(measure, part)(regex, arguments.quick)
         if not result["rows"]:
             sys.exit(f"no benchmark matches '{regex.pattern}'")
         print_rows(result["rows"])
+        for table in page.more_tables(result).values():
+            print("", table, sep="\n")
     if arguments.json:
         arguments.json.write_text(page.to_json(result.get("rows", result)) + "\n")
     if arguments.record:

@@ -177,9 +177,13 @@ void addUnequal(std::vector<Case>& cases, const Task& task, const std::string& r
     cases.push_back(ours(task, warmStart, "fast", reference));
 }
 
-void addRelaxed(std::vector<Case>& cases, Task task, const std::string& feasible) {
+// One that is out of reach, against one that is hard for eiquadprog and, cold, an easy one.
+void addRelaxed(std::vector<Case>& cases, Task task, const std::string& hard,
+                const std::string& easy) {
   task.status = DistributionStatus::Relaxed;
-  addUnequal(cases, task, feasible);
+  addUnequal(cases, task, hard);
+  cases.push_back(ours(task, false, "fast", easy));
+  cases.back().name += "_inside";
 }
 
 // Reading a robot takes long: it is done once, where the robot is wanted at all.
@@ -222,15 +226,18 @@ std::vector<Case> makeCases() {
   }
 
   // More than friction holds, more than the weight holds down, and as much as lifts the robot.
-  addRelaxed(cases, {"soles/slipping", talos, pushed(800., 300., 0., 0., 0., 0.)}, "soles/active4");
-  addRelaxed(cases, {"soles/tipping", talos, pushed(0., 0., 0., 100., 200., 0.)}, "soles/active4");
-  addRelaxed(cases, {"soles/lifted", talos, pushed(50., 0., 2000., 0., 0., 0.)}, "soles/active4");
+  addRelaxed(cases, {"soles/slipping", talos, pushed(800., 300., 0., 0., 0., 0.)}, "soles/active4",
+             "soles/inside");
+  addRelaxed(cases, {"soles/tipping", talos, pushed(0., 0., 0., 100., 200., 0.)}, "soles/active4",
+             "soles/inside");
+  addRelaxed(cases, {"soles/lifted", talos, pushed(50., 0., 2000., 0., 0., 0.)}, "soles/active4",
+             "soles/inside");
   addRelaxed(cases, {"points/slipping", quadruped, pushed(500., 200., 0., 0., 0., 0.)},
-             "points/edge");
+             "points/edge", "points/inside");
   addRelaxed(cases, {"points/tipping", quadruped, pushed(0., 0., 0., 200., 300., 0.)},
-             "points/edge");
-  addRelaxed(cases, {"points/lifted", quadruped, pushed(50., 0., 1000., 0., 0., 0.)},
-             "points/edge");
+             "points/edge", "points/inside");
+  addRelaxed(cases, {"points/lifted", quadruped, pushed(50., 0., 1000., 0., 0., 0.)}, "points/edge",
+             "points/inside");
 
   // Growth with the number of contacts. One point or two cannot give every wrench, which leaves
   // eiquadprog with equations that depend on each other, and without an answer.

@@ -4,7 +4,10 @@
 // Usage: bench_walk WALK SAMPLES REPETITIONS
 //
 // Writes the time of each call [ns, float] to SAMPLES: for each repetition, for each way to solve
-// (in the order of the calls of `pass` below), for each tick of the walk.
+// (in the order of the calls of `pass` below), for each tick of the walk. Prints, as JSON, how many
+// iterations each tick takes, warm and cold.
+#include <cstdio>
+
 #include "walk.hpp"
 
 using namespace dynacom::benchmarks;
@@ -27,6 +30,20 @@ int main(int argc, char** argv) {
       requireSameForces(walk.talos, solver->solve(programs[i].ce0));
     }
   }
+
+  for (const bool warm : {true, false}) {
+    walk.talos.setWarmStart(warm);
+    std::printf("%s: [", warm ? "{\"warm\"" : "], \"cold\"");
+    for (std::size_t tick = 0; tick < 2 * walk.size(); ++tick) {
+      const std::size_t i = tick % walk.size();
+      walk.step(i);
+      walk.computeDynamics(i);
+      walk.distributeForce();
+      if (tick >= walk.size())
+        std::printf("%s%d", i > 0 ? ", " : "", walk.talos.getDistribution().iterations);
+    }
+  }
+  std::printf("]}\n");
 
   std::vector<float> samples;
   // Each goes through the walk on its own, as in a controller that has no other solver: what comes

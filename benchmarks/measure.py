@@ -27,6 +27,11 @@ EIQUADPROG = ("eiquadprog/plain/walk", "eiquadprog/fast/walk")
 CLOCK = "walk/clock"
 WAYS = (*OURS, *EIQUADPROG, CLOCK)
 PERCENTILES = {"p99": 99, "p99.9": 99.9, "maximum": 100}
+# The walk at the rate of its file, and at that of a controller; names of rows have the first word.
+WALKS = {"walk": None, "walk_1kHz": 1000}
+
+# What bench_boundary is asked: which caps on the iterations.
+CAPS = (20, 50, 200, 100000)
 
 # What bench_jitter measures of each tick, and the edges of its histograms [ns]: 20 bins a decade.
 JITTER_SORTS = ("wake-up latency", "computation", "distributeForce")
@@ -102,46 +107,74 @@ def case_rows(executable, regex, quick):
     return [make_row(name, medians[name], cases[name], medians.get(cases[name])) for name in chosen]
 
 
-def write_walk():
+def interpolate(walk, rate):
+    """The arrays of a walk at this rate [Hz]; a foot stands if it does just before or just after.
+
+    Between these frames the wrench goes over from foot to foot: it takes both.
+    """
+    frames = walk["t"]
+    t = np.arange(round((frames[-1] - frames[0]) * rate)) / rate + frames[0]
+    before = np.searchsorted(frames, t + 1e-9, side="right") - 1
+    between = {
+        key: np.column_stack([np.interp(t, frames, column) for column in walk[key].T])
+        for key in ("q", "v", "a")
+    }
+    # Frames are so close that a straight line between quaternions is as good as an arc.
+    between["q"][:, 3:7] /= np.linalg.norm(between["q"][:, 3:7], axis=1, keepdims=True)
+    after = np.minimum(before + 1, len(frames) - 1)
+    return {**between, "contacts": walk["contacts"][before] | walk["contacts"][after]}
+
+
+def write_walk(rate=None):
     """Write the bundled walk of Talos for walk.hpp; return the file, and which soles stand when."""
-    walk = np.load(ROOT / "examples/data/talos_walk.npz")
+    walk = dict(np.load(ROOT / "examples/data/talos_walk.npz"))
     names = list(walk["contact_names"])
+    if rate:
+        walk.update(interpolate(walk, rate))
     soles = walk["contacts"][:, [names.index("left_sole"), names.index("right_sole")]]
-    path = FOLDER / "talos_walk.txt"
+    path = FOLDER / f"talos_walk_{rate or 'frames'}.txt"
     np.savetxt(path, np.hstack([soles, walk["q"], walk["v"], walk["a"]]), fmt="%.17g")
     return path, soles
 
 
 def walk_times(path, ticks, quick):
-    """Times of each call [ns], repetitions x ways x ticks."""
+    """Times of each call [ns], repetitions x ways x ticks; and the iterations of each tick."""
     say("bench_walk")
-    repetitions = 50 if quick else 1000
+    repetitions = max(10, (16_000 if quick else 318_000) // ticks)
     with tempfile.TemporaryDirectory() as folder:
         samples = Path(folder, "samples")
-        run(FOLDER / "bench_walk", path, samples, repetitions)
+        iterations = json.loads(run(FOLDER / "bench_walk", path, samples, repetitions))
         times = np.fromfile(samples, np.float32)
-    return times.reshape(repetitions, len(WAYS), ticks).astype(float)
+    return times.reshape(repetitions, len(WAYS), ticks).astype(float), iterations
 
 
-def walk_rows(times, soles):
+def walk_rows(walk, times, soles):
     """Rows of the medians against eiquadprog, over all ticks and by support; and of percentiles."""
     rows = []
+
+    def add(name, time, reference=None, reference_time=None):
+        def rename(name):
+            return name and name.replace("walk", walk)
+
+        rows.append(make_row(rename(name), time, rename(reference), reference_time))
+
     supports = {"": soles.any(1), "/single": soles.sum(1) == 1, "/double": soles.sum(1) == 2}
     for support, ticks in supports.items():
         medians = {way: float(np.median(times[:, i, ticks])) for i, way in enumerate(WAYS)}
-        rows += [make_row(way + support, medians[way]) for way in EIQUADPROG]
+        for way in EIQUADPROG:
+            add(way + support, medians[way])
         for way in OURS:
             for reference in EIQUADPROG:
                 name = f"{way}{support}/vs_{reference.split('/')[1]}"
-                rows.append(make_row(name, medians[way], reference + support, medians[reference]))
+                add(name, medians[way], reference + support, medians[reference])
     for i, way in enumerate(WAYS):
         median = float(np.median(times[:, i]))
         # Of all calls; and of the ticks' own medians, which leaves out what else the machine did.
         for kind, sample in (("calls", times[:, i]), ("ticks", np.median(times[:, i], axis=0))):
             for label, percent in PERCENTILES.items():
                 value = float(np.percentile(sample, percent))
-                rows.append(make_row(f"{way}/{kind}/{label}", value, f"{way}, median", median))
-    rows.append(make_row(CLOCK, median))
+                add(f"{way}/{kind}/{label}", value, f"{way}, median", median)
+    add(CLOCK, median)
     return rows
 
 
@@ -150,6 +183,63 @@ def walk_profile(times, soles):
     medians = np.median(times, axis=0).round().astype(int)
     profile = {way: medians[i].tolist() for i, way in enumerate(WAYS)}
     return {"soles": soles.sum(1).tolist(), "ticks": profile}
+
+
+def iterations_profile(iterations):
+    """Of a walk, warm and cold: all iterations, in how many ticks there were more, how many."""
+    return {
+        start: {
+            "ticks": len(ticks),
+            "all": int(np.sum(ticks)),
+            "repeated": int(np.sum(np.array(ticks) > 1)),
+            "most": int(np.max(ticks)),
+        }
+        for start, ticks in iterations.items()
+    }
+
+
+def walks(regex, quick):
+    """Rows of the walks that match; the picture of the first; and iterations."""
+    result = {"rows": []}
+    for walk, rate in WALKS.items():
+        path, soles = write_walk(rate)
+        rows = walk_rows(walk, np.ones((1, len(WAYS), len(soles))), soles)
+        if not any(regex.search(row["name"]) for row in rows):
+            continue
+        samples, iterations = walk_times(path, len(soles), quick)
+        rows = walk_rows(walk, samples, soles)
+        result["rows"] += [row for row in rows if regex.search(row["name"])]
+        if rate is None:
+            result["walk"] = walk_profile(samples, soles)
+        result.setdefault("iterations", {})[walk] = iterations_profile(iterations)
+    return result
+
+
+def boundary(regex, quick):
+    """Rows of what wrenches next to the boundary take, by cap; and how many had no answer."""
+    names = {
+        (robot, cap): f"distributeForce/{robot}/boundary/cap{cap}"
+        for cap in CAPS
+        for robot in ("soles", "points")
+    }
+    chosen = [key for key in names if regex.search(names[key])]
+    if not chosen:
+        return {"rows": []}
+    say("bench_boundary")
+    number, repetitions = (500, 5) if quick else (5000, 9)
+    caps = dict.fromkeys(cap for _, cap in chosen)
+    lines = run(FOLDER / "bench_boundary", number, repetitions, *caps).splitlines()
+    rows, kept = [], []
+    for entry in map(json.loads, lines):
+        times = entry.pop("times")
+        key = entry["robot"], entry["cap"]
+        if key not in chosen:
+            continue
+        values = {label: float(np.percentile(times, p)) for label, p in PERCENTILES.items()}
+        values["median"] = statistics.median(times)
+        rows += [make_row(f"{names[key]}/{label}", value) for label, value in values.items()]
+        kept.append({**entry, "wrenches": number, **values})
+    return {"rows": rows, "boundary": kept}
 
 
 def python_row(quick):
@@ -165,16 +255,13 @@ def python_row(quick):
 
 
 def times(regex, quick):
-    """All that is timed and matches; where the walk is among it, what its picture shows too."""
+    """All that is timed and matches, with what the page shows besides."""
     result = {"rows": []}
     for executable in CASES:
         result["rows"] += case_rows(executable, regex, quick)
-    path, soles = write_walk()
-    names = [row["name"] for row in walk_rows(np.ones((1, len(WAYS), len(soles))), soles)]
-    if any(map(regex.search, names)):
-        samples = walk_times(path, len(soles), quick)
-        result["rows"] += [row for row in walk_rows(samples, soles) if regex.search(row["name"])]
-        result["walk"] = walk_profile(samples, soles)
+    for part in (walks(regex, quick), boundary(regex, quick)):
+        result["rows"] += part.pop("rows")
+        result.update(part)
     if regex.search(PYTHON_TICK):
         result["rows"].append(python_row(quick))
     return result

@@ -14,37 +14,65 @@ import sys
 from pathlib import Path
 
 import plots
-from measure import EIQUADPROG, JITTER_SORTS, OURS, PYTHON_BOUND, PYTHON_TICK, WAYS
+from measure import EIQUADPROG, JITTER_SORTS, OURS, PYTHON_BOUND, PYTHON_TICK, WALKS, WAYS
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 RECORD = DOCS / "performance.json"
 
-# The goal of each row that has one, and what it is called.
+# What rows are called, and their goals; those without one are shown beside the others.
 GOAL_TABLE = {
     "distributeForce/soles/inside/vs_plain": ("2 soles, none active, cold", 0.15),
     "distributeForce/soles/inside/vs_fast": ("2 soles, none active, cold", 0.20),
+    "distributeForce/soles/inside/vs_rt": ("2 soles, none active, cold", None),
     "distributeForce/soles/active2/vs_fast": ("2 soles, 2 active, cold", 0.5),
     "distributeForce/soles/active3/vs_fast": ("2 soles, 3 active, cold", 0.5),
     "distributeForce/soles/active4/vs_fast": ("2 soles, 4 active, cold", 0.5),
+    "distributeForce/soles/active4/vs_rt": ("2 soles, 4 active, cold", None),
     "distributeForce/soles/active5/vs_fast": ("2 soles, 5 active, cold", 0.5),
     "distributeForce/soles/active6/vs_fast": ("2 soles, 6 active, cold", 0.5),
-    "distributeForce/soles/slipping/vs_fast": ("2 soles, slipping, cold", 1.0),
-    "distributeForce/soles/tipping/vs_fast": ("2 soles, tipping, cold", 1.0),
-    "distributeForce/soles/lifted/vs_fast": ("2 soles, lifted, cold", 1.0),
-    "distributeForce/points/slipping/vs_fast": ("4 points, slipping, cold", 1.0),
-    "distributeForce/points/tipping/vs_fast": ("4 points, tipping, cold", 1.0),
-    "distributeForce/points/lifted/vs_fast": ("4 points, lifted, cold", 1.0),
+    "distributeForce/soles/slipping/vs_fast": ("2 soles, slipping, against 4 active", 1.0),
+    "distributeForce/soles/slipping/vs_fast_inside": (
+        "2 soles, slipping, against none active",
+        1.0,
+    ),
+    "distributeForce/soles/tipping/vs_fast": ("2 soles, tipping, against 4 active", 1.0),
+    "distributeForce/soles/tipping/vs_fast_inside": (
+        "2 soles, tipping, against none active",
+        1.0,
+    ),
+    "distributeForce/soles/lifted/vs_fast": ("2 soles, lifted, against 4 active", 1.0),
+    "distributeForce/soles/lifted/vs_fast_inside": (
+        "2 soles, lifted, against none active",
+        1.0,
+    ),
+    "distributeForce/points/slipping/vs_fast": ("4 points, slipping, against `edge`", 1.0),
+    "distributeForce/points/slipping/vs_fast_inside": (
+        "4 points, slipping, against none active",
+        1.0,
+    ),
+    "distributeForce/points/tipping/vs_fast": ("4 points, tipping, against `edge`", 1.0),
+    "distributeForce/points/tipping/vs_fast_inside": (
+        "4 points, tipping, against none active",
+        1.0,
+    ),
+    "distributeForce/points/lifted/vs_fast": ("4 points, lifted, against `edge`", 1.0),
+    "distributeForce/points/lifted/vs_fast_inside": (
+        "4 points, lifted, against none active",
+        1.0,
+    ),
     "distributeForce/points/inside/vs_fast": ("4 points, none active, cold", 0.25),
     "distributeForce/points8/inside/vs_fast": ("8 points, none active, cold", 0.25),
     "distributeForce/soles4/inside/vs_fast": ("4 soles, none active, cold", 0.25),
     "distributeForce/walk/warm/vs_plain": ("the walk, warm, median", 0.15),
+    "distributeForce/walk_1kHz/warm/vs_plain": ("the walk at 1 kHz, warm, median", None),
+    "distributeForce/walk_1kHz/cold/vs_plain": ("the walk at 1 kHz, cold, median", None),
     "distributeForce/walk/warm/calls/p99.9": ("the walk, warm, p99.9 of all calls", 3.0),
     "distributeForce/walk/warm/ticks/p99.9": ("the walk, warm, p99.9 of ticks' medians", 3.0),
     "computeDynamics": ("`computeDynamics`, Talos", 1.02),
     "computeDynamics(data)": ("`computeDynamics(data)`, Talos", 0.1),
     PYTHON_TICK: ("a tick from Python, Talos", 1.0),
 }
-GOALS = {name: goal for name, (_, goal) in GOAL_TABLE.items()}
+GOALS = {name: goal for name, (_, goal) in GOAL_TABLE.items() if goal}
 
 
 def to_json(value, *, depth=3):
@@ -104,9 +132,10 @@ def show_reference(name):
 
 
 def goal_rows(times):
-    """(what, row, goal) of all that there are goals for."""
+    """(what, row, goal) of all that the table of goals shows; goal is None where there is none."""
     rows = {row["name"]: row for row in times["rows"]}
-    return [(what, rows[name], goal) for name, (what, goal) in GOAL_TABLE.items()]
+    shown = {name: entry for name, entry in GOAL_TABLE.items() if name in rows}
+    return [(what, rows[name], goal) for name, (what, goal) in shown.items()]
 
 
 def goals_table(times):
@@ -118,8 +147,10 @@ def goals_table(times):
                 what,
                 microseconds(row["median_ns"]),
                 f"{show_reference(row['reference'])}, {reference}",
-                f"{row['ratio']:.2f}" if row["ratio"] <= goal else f"**{row['ratio']:.2f}**",
-                f"≤ {goal:g}",
+                f"**{row['ratio']:.3f}**"
+                if goal and row["ratio"] > goal
+                else f"{row['ratio']:.3f}",
+                f"≤ {goal:g}" if goal else "",
             )
         )
     return markdown(("what", "measured", "reference", "ratio", "goal"), lines)
@@ -150,17 +181,18 @@ def cases_table(times):
     return markdown(header, lines)
 
 
-def walk_table(times):
+def walk_table(times, walk="walk"):
     rows = {row["name"]: row["median_ns"] for row in times["rows"]}
     lines = []
     for way in WAYS:
+        row = way.replace("walk", walk)
         is_ours = way in OURS
         medians = [
-            rows.get(f"{way}{support}/vs_fast" if is_ours else way + support)
+            rows.get(f"{row}{support}/vs_fast" if is_ours else row + support)
             for support in ("", "/single", "/double")
         ]
         percentiles = [
-            rows[f"{way}/{kind}/{label}"]
+            rows[f"{row}/{kind}/{label}"]
             for kind in ("calls", "ticks")
             for label in ("p99", "p99.9", "maximum")
         ]
@@ -174,17 +206,51 @@ def walk_table(times):
     return markdown(header, lines)
 
 
+def iterations_table(iterations):
+    """What a warm start gives along the walks."""
+    rates = {walk: f"{rate} Hz" if rate else "that of its frames" for walk, rate in WALKS.items()}
+    lines = []
+    for walk, starts in iterations.items():
+        for start, of in starts.items():
+            numbers = (of["ticks"], of["all"], of["repeated"], of["most"])
+            lines.append((rates[walk], start, *map(str, numbers)))
+    header = ("rate", "start", "ticks", "iterations", "ticks with more than one", "the most")
+    return markdown(header, lines)
+
+
+def boundary_table(boundary):
+    robots = {"soles": "2 soles", "points": "4 points"}
+    lines = [
+        (
+            robots[row["robot"]],
+            f"{row['cap']}",
+            f"{100 * row['failures'] / row['wrenches']:.1f} %",
+            f"{row['iterations']}",
+            *(f"{row[label] / 1000:.0f} µs" for label in ("median", "p99", "maximum")),
+        )
+        for row in boundary
+    ]
+    header = ("contacts", "cap", "without an answer", "most iterations")
+    return markdown((*header, "median", "p99", "maximum"), lines)
+
+
+def more_tables(times):
+    """What is no row: iterations, and how many wrenches had no answer."""
+    tables = {"iterations": iterations_table, "boundary": boundary_table}
+    return {name: table(times[name]) for name, table in tables.items() if name in times}
+
+
 def counts_table(counts):
     lines = []
     for row in counts["rows"]:
-        if row["name"] not in GOALS:
+        if row["name"] not in GOAL_TABLE:
             continue
         lines.append(
             (
                 GOAL_TABLE[row["name"]][0],
                 f"{row['instructions']:.0f}",
                 f"{show_reference(row['reference'])}, {row['instructions'] / row['ratio']:.0f}",
-                f"{row['ratio']:.2f}",
+                f"{row['ratio']:.3f}",
             )
         )
     return markdown(("what", "instructions", "reference", "ratio"), lines)
@@ -222,10 +288,15 @@ def write():
         blocks["when"] = provenance(times)
         blocks["goals"] = goals_table(times)
         blocks["cases"] = cases_table(times)
-        blocks["walk"] = walk_table(times)
+        names = {row["name"] for row in times["rows"]}
+        for walk in WALKS:
+            if f"distributeForce/{walk}/warm/vs_fast" in names:
+                blocks[walk] = walk_table(times, walk)
+        blocks.update(more_tables(times))
         goals = [
             (f"{what.replace('`', '')} / {show_reference(row['reference'])}", row["ratio"], goal)
             for what, row, goal in goal_rows(times)
+            if goal
         ]
     if counts := parts.get("counts"):
         blocks["counts"] = f"{provenance(counts)}\n\n{counts_table(counts)}"

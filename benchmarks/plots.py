@@ -41,7 +41,7 @@ def draw_goals(goals, folder):
     for place, share, ratio, limit in zip(places, shares, ratios, limits, strict=True):
         cut = "»" if share > widest else ""
         axes.text(widest, place, cut, va="center", ha="right", color="white", weight="bold")
-        axes.text(widest + 0.04, place, f"{ratio:.2f} of {limit:g}", va="center", fontsize=8)
+        axes.text(widest + 0.04, place, f"{ratio:.3f} of {limit:g}", va="center", fontsize=8)
     axes.set_yticks(places, labels)
     axes.set_ylim(len(goals) - 0.4, -0.6)
     axes.set_xlim(0, widest + 0.4)

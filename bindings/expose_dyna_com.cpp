@@ -119,8 +119,8 @@ void exposeDynaCoM() {
            "How many iterations a distribution may take.")
       .def("setMaximalIterations", &DynaCoM::setMaximalIterations,
            (bp::arg("self"), bp::arg("maximalIterations")),
-           "How many it may take, see WrenchDistribution.setMaximalIterations(). ValueError\n"
-           "unless maximalIterations > 0.")
+           "How many it may take, 100,000 by default; a controller sets 50, see\n"
+           "WrenchDistribution.setMaximalIterations(). ValueError unless maximalIterations > 0.")
 
       .def("computeDynamics", &computeDynamics,
            (bp::arg("self"), bp::arg("q"), bp::arg("v"), bp::arg("a"),

@@ -192,16 +192,18 @@ void exposeWrenchDistribution() {
       .def("setWarmStart", &WrenchDistribution::setWarmStart,
            (bp::arg("self"), bp::arg("warmStart")),
            "Whether solve() starts from the inequalities that were active in each slot's last\n"
-           "answer, if that was no more than ten problems ago, as is the default; else it starts\n"
-           "with none. That changes how long it takes, and answers by no more than rounding.")
+           "answer, as is the default; else it starts with none. A slot that takes no part in up\n"
+           "to ten solve() still knows its own afterwards; after more it starts with none. That\n"
+           "changes how long it takes, and answers by no more than rounding.")
       .def("getWarmStart", &WrenchDistribution::getWarmStart, bp::arg("self"),
            "Whether it does; True by default.")
       .def("setMaximalIterations", &WrenchDistribution::setMaximalIterations,
            (bp::arg("self"), bp::arg("maximalIterations")),
            "How many iterations solve() may take, kMaximalIterations by default: those of\n"
            "DistributionResult.iterations. Of feet on level ground nearly all problems take less\n"
-           "than 10; a problem that needs more than this ends as NumericalFailure. ValueError\n"
-           "unless maximalIterations > 0.")
+           "than 10; a problem that needs more than this ends as NumericalFailure. A controller\n"
+           "sets 50, or what docs/real_time.md says of the time that it has. ValueError unless\n"
+           "maximalIterations > 0.")
       .def("getMaximalIterations", &WrenchDistribution::getMaximalIterations, bp::arg("self"),
            "How many iterations solve() may take.")
       .def("reserve", &WrenchDistribution::reserve,

@@ -6,6 +6,8 @@
 #include <dynacom/contact6d.hpp>
 #include <dynacom/dyna_com.hpp>
 #include <pinocchio/algorithm/centroidal.hpp>
+#include <string>
+#include <vector>
 
 int main(int argc, char** argv) {
   dynacom::DynaCoMSettings settings;
@@ -21,7 +23,7 @@ int main(int argc, char** argv) {
     talos.addContact(std::make_shared<dynacom::Contact6D>(sole), side);
   }
   // Nearly all distributions take one iteration. What has no answer after so many gets none.
-  talos.setMaximalIterations(200);
+  talos.setMaximalIterations(50);
 
   // Other parts of the controller need Pinocchio's results, too: they are computed once a tick.
   const pinocchio::Model& model = talos.getModel();
@@ -37,7 +39,14 @@ int main(int argc, char** argv) {
   measured.translation().z() -= 0.005;
   talos.setContactPose(right, measured);
 
-  std::printf("   t [s]  status     left, right f_z [N]\n");
+  // What happens every 100 ms is printed afterwards: printing calls the system.
+  struct Record {
+    double t;
+    dynacom::DistributionStatus status;
+    double left, right;  // f_z
+  };
+  std::vector<Record> records;
+  records.reserve(10);
   for (int tick = 0; tick < 1000; ++tick) {
     // Talos sways sideways, and lifts its left foot while it leans on the right one.
     const double t = 0.001 * tick;
@@ -53,8 +62,12 @@ int main(int argc, char** argv) {
     const dynacom::DistributionStatus status = talos.distributeForce(
         talos.getGroundCoMForce(), talos.getGroundCoMTorque(), talos.getCoM());
     if (tick % 100 == 50)
-      std::printf("%8.2f  %-9s %8.1f %8.1f\n", t, dynacom::to_string(status),
-                  talos.getContact(left)->appliedForce()[2],
-                  talos.getContact(right)->appliedForce()[2]);
+      records.push_back({t, status, talos.getContact(left)->appliedForce()[2],
+                         talos.getContact(right)->appliedForce()[2]});
   }
+
+  std::printf("   t [s]  status     left, right f_z [N]\n");
+  for (const Record& record : records)
+    std::printf("%8.2f  %-9s %8.1f %8.1f\n", record.t, dynacom::to_string(record.status),
+                record.left, record.right);
 }

@@ -21,7 +21,7 @@ for side in "left", "right":
     sole.gu = 0.1
     talos.addContact(dynacom.Contact6D(sole), side)
 # Nearly all distributions take one iteration. What has no answer after so many gets none.
-talos.setMaximalIterations(200)
+talos.setMaximalIterations(50)
 
 # Other parts of the controller need Pinocchio's results, too: they are computed once a tick.
 model = talos.getModel()
@@ -36,7 +36,8 @@ measured = pinocchio.SE3(talos.getContact("right").getPose())
 measured.translation[2] -= 0.005
 talos.setContactPose("right", measured)
 
-print("   t [s]  status     left, right f_z [N]")
+# What happens every 100 ms is printed afterwards: printing calls the system.
+records = []
 for tick in range(1000):
     # Talos sways sideways, and lifts its left foot while it leans on the right one.
     t = 0.001 * tick
@@ -56,4 +57,8 @@ for tick in range(1000):
     )
     if tick % 100 == 50:
         left, right = (talos.getContact(side).appliedForce()[2] for side in ("left", "right"))
-        print(f"{t:8.2f}  {status!s:<9} {left:8.1f} {right:8.1f}")
+        records.append((t, status, left, right))
+
+print("   t [s]  status     left, right f_z [N]")
+for t, status, left, right in records:
+    print(f"{t:8.2f}  {status!s:<9} {left:8.1f} {right:8.1f}")

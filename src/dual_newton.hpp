@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
+#include <cstring>
 #include <optional>
 #include <vector>
 
@@ -62,12 +64,12 @@ class Factors6 {
 /// are at their bounds, and which contacts bear a load.
 ///
 /// It starts from the state of the last answer, or from none at their bounds, where its first step
-/// is the closed form for forces without inequalities. At first there is no ε: as long as the state
-/// can give all wrenches, a step leads to the multipliers that would be the answer if the state
-/// stayed. Where that does not end, ε > 0 makes steps whose length can be chosen so that the dual
-/// falls. What is found with ε serves to know the state, and no more: the answer follows from it by
-/// linear equations without ε, for both stages, and proves itself. What does not, and what hangs on
-/// the last digits, is left to TwoStageSolver.
+/// is the closed form for forces without inequalities, simpler still for a sole on its own. At
+/// first there is no ε: as long as the state can give all wrenches, a step leads to the multipliers
+/// that would be the answer if the state stayed. Where that does not end, ε > 0 makes steps whose
+/// length can be chosen so that the dual falls. What is found with ε serves to know the state, and
+/// no more: the answer follows from it by linear equations without ε, for both stages, and proves
+/// itself. What does not, and what hangs on the last digits, is left to TwoStageSolver.
 ///
 /// Contacts are known by slot. Nothing is allocated but by reserve().
 class DualNewton {
@@ -102,6 +104,11 @@ class DualNewton {
   /// How many steps solve() took.
   int iterations() const { return iterations_; }
 
+  /// How many of them were an attempt from the last answer that led nowhere: at most
+  /// maximal_iterations, which counts the others on their own, so that a warm start finds whatever
+  /// is found without.
+  int iterationsInVain() const { return iterations_in_vain_; }
+
  private:
   using Matrix6 = Factors6::Matrix6;
 
@@ -110,10 +117,20 @@ class DualNewton {
     bool loaded = false;
     std::array<signed char, 8> bounds = {};  // as many as compare at once
 
+    bool hasBounds(const State& other) const {
+      std::uint64_t mine, others;  // compilers call a function to compare the arrays
+      std::memcpy(&mine, bounds.data(), sizeof mine);
+      std::memcpy(&others, other.bounds.data(), sizeof others);
+      return mine == others;
+    }
     bool operator==(const State& other) const {
-      return loaded == other.loaded && (!loaded || bounds == other.bounds);
+      return loaded == other.loaded && (!loaded || hasBounds(other));
     }
   };
+
+  /// Where to start from: no component at its bound but for those that are always zero, or the
+  /// state that led to the last answer.
+  enum class Start { Free, LastAnswer };
 
   /// A contact in units of its cost: its forces are x = W λ, with W the weights over the largest.
   /// What a point does not have is zero.
@@ -129,7 +146,7 @@ class DualNewton {
     // The state with no component at its bound, but for those without extent; that at hand, and at
     // the last keepStates(); and the one that led to the last answer.
     State free, state, former, last;
-    std::size_t last_problem;  // that it took part in, when it did not any more
+    std::size_t last_problem_number;  // of that it took part in, when it did not any more
     // In this state, forces that respond to a pull are its projection on the free components, and
     // on the direction in which those at their bounds go with the normal force.
     Vector6 is_free, edge;
@@ -144,11 +161,12 @@ class DualNewton {
   static void enter(Block& block, const State& state);
   template <int kSize>
   static State findState(const Block& block);
+  static bool isInside(const Block& block, const Vector6& force);
   static Vector6 respond(const Block& block, const Vector6& pull);
   static Vector6 pullOf(const Block& block, const Vector6& multipliers);
   static void addWrench(const Block& block, const Vector6& force, Vector6& wrench);
   static Vector6 normalWrench(const Block& block);
-  bool begin(bool from_last_answer);
+  bool begin(Start start);
   void keepStates();
   bool evaluate();
   void restart(const Vector6& multipliers);
@@ -158,6 +176,8 @@ class DualNewton {
   bool isReached(const Vector6& wrench, double enough) const;
   void refine(const Vector6& wrench, double enough);
   bool isFinite() const;
+  int stepsTaken() const { return iterations_ - iterations_in_vain_; }
+  bool stepAsSole();
   bool stepFreely(int steps);
   bool stepWithSlack();
   DistributionStatus search(bool from_last_answer);
@@ -183,8 +203,8 @@ class DualNewton {
   int rank_ = 6;
   Matrix6 range_ = Matrix6::Zero();
   std::vector<Vector6> directions_;
-  int iterations_ = 0, maximal_iterations_ = 0;
-  std::size_t problem_ = 0;  // counts solve()
+  int iterations_ = 0, iterations_in_vain_ = 0, maximal_iterations_ = 0;
+  std::size_t problem_number_ = 0;  // counts solve()
 };
 
 }  // namespace dynacom::internal

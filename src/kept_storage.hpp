@@ -8,7 +8,7 @@ namespace dynacom::internal {
 
 /// A matrix or vector that keeps the storage of the largest that it has been, so that it can become
 /// smaller and larger again without allocating, as Eigen's own cannot. What is assigned gives it
-/// its size; resizing loses what it held.
+/// its size; resizing loses what it held, so that it must not be assigned an expression of itself.
 template <class Plain>
 class Kept : public Eigen::Map<Plain> {
  public:

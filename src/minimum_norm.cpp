@@ -45,6 +45,7 @@ template <class Scalar>
 typename MinimumNorm<Scalar>::Status MinimumNorm<Scalar>::solve(
     const MatrixRef& E, const VectorRef& d, const MatrixRef& G, const VectorRef& h,
     Scalar tolerance, Scalar dependent, int maximal_iterations) {
+  eigen_assert(E.cols() <= kMaximalEqualities);
   iterations_ = 0;
   reserve(E.rows(), E.cols(), G.cols());
   implied_.clear();

@@ -200,12 +200,12 @@ struct WrenchDistribution::Workspace {
     Eigen::VectorXd weights;
     std::uint64_t revision = 0;  // of the contact, if it was one
     NewtonEuler NE;
-    bool changed = true;           // whether the last solve() knew other inequalities and weights
-    bool moved = false;            // whether it knew another NE
-    std::size_t problem = 0;       // the last that it was added to
-    Contact parked;                // its share of the result while it is not part of that
-    Contact spare;                 // storage for another size
-    Eigen::VectorXd former_force;  // of the answer before
+    bool changed = true;             // whether the last solve() knew other inequalities and weights
+    bool moved = false;              // whether it knew another NE
+    std::size_t problem_number = 0;  // of the last that it was added to
+    Contact parked;                  // its share of the result while it is not part of that
+    Contact spare;                   // storage for another size
+    Eigen::VectorXd former_force;    // of the answer before
 
     Eigen::Index rows() const { return unilaterality.rows() + friction.rows(); }
   };
@@ -216,7 +216,7 @@ struct WrenchDistribution::Workspace {
   int maximal_iterations = kMaximalIterations;
 
   std::vector<Slot> slots;
-  std::size_t problem = 1;          // counts clear()
+  std::size_t problem_number = 1;   // counts clear()
   std::vector<std::size_t> added;   // slots of the next solve()
   std::vector<std::size_t> solved;  // slots of the result's contacts
   bool has_answer = false;          // whether the forces in result are an answer for its contacts
@@ -239,8 +239,11 @@ struct WrenchDistribution::Workspace {
   void takeProblem();
   void rearrange();
   bool distribute();
+  bool distributeRobustly();
   template <class Scalar>
   bool distributeBy(TwoStageSolver<Scalar>& solver);
+  template <class Scalar>
+  void writeAnswer(TwoStageSolver<Scalar>& solver);
   bool hasFiniteMatrices() const;
   void keepAnswer();
   void sumUp();
@@ -286,7 +289,7 @@ int WrenchDistribution::getMaximalIterations() const { return work_->maximal_ite
 
 void WrenchDistribution::clear() {
   work_->added.clear();
-  ++work_->problem;
+  ++work_->problem_number;
 }
 
 void WrenchDistribution::reset() {
@@ -311,8 +314,8 @@ WrenchDistribution::Workspace::Slot& WrenchDistribution::Workspace::findSlot(std
 // The slot, as a part of the next problem.
 WrenchDistribution::Workspace::Slot& WrenchDistribution::Workspace::takeSlot(std::size_t slot) {
   Slot& found = findSlot(slot);
-  if (found.problem == problem) throwInvalid("slot ", slot, " is taken already");
-  found.problem = problem;
+  if (found.problem_number == problem_number) throwInvalid("slot ", slot, " is taken already");
+  found.problem_number = problem_number;
   added.push_back(slot);
   return found;
 }
@@ -363,7 +366,8 @@ void WrenchDistribution::Workspace::reserve() {
 void WrenchDistribution::reserve(const ContactBase& contact, std::size_t slot) {
   requireInitialised(contact);
   Workspace::Slot& found = work_->findSlot(slot);
-  if (found.problem == work_->problem) throwInvalid("slot ", slot, " is taken already");
+  if (found.problem_number == work_->problem_number)
+    throwInvalid("slot ", slot, " is taken already");
   work_->describe(found, contact);
 }
 
@@ -433,21 +437,28 @@ void WrenchDistribution::Workspace::rearrange() {
   exchange();
 }
 
-// Few problems need more digits than double has: those where contacts are nearly parallel, and
-// where the wrench is so close to the boundary that it is barely known which side it is on.
-// Returns false if there is no answer.
+// Returns false if there is no answer. What an attempt from the last one has taken in vain comes on
+// top of the iterations that are allowed, and is counted where they leave room for it.
 bool WrenchDistribution::Workspace::distribute() {
   result.status = newton.solve(result.contacts, weighted(settings, result.wrench) / result.scale,
                                wrench_weights, warm_start, maximal_iterations);
-  result.iterations = newton.iterations();
+  result.iterations = newton.iterations() - newton.iterationsInVain();
+  bool answered = true;
   if (result.status != DistributionStatus::NumericalFailure) {
     newton.writeAnswer(result, unit, overall_weight);
-    return true;
-  }
-  if (!hasFiniteMatrices()) {
+  } else if (!hasFiniteMatrices()) {
     result.status = DistributionStatus::InvalidInput;
-    return false;
+    answered = false;
+  } else {
+    answered = distributeRobustly();
   }
+  result.iterations = std::min(result.iterations + newton.iterationsInVain(), maximal_iterations);
+  return answered;
+}
+
+// Few problems need more digits than double has: those where contacts are nearly parallel, and
+// where the wrench is so close to the boundary that it is barely known which side it is on.
+bool WrenchDistribution::Workspace::distributeRobustly() {
   for (std::size_t k = 0; k < solved.size(); ++k)
     slots[solved[k]].former_force = result.contacts[k].force;
   const bool answered = distributeBy(solver);
@@ -456,13 +467,14 @@ bool WrenchDistribution::Workspace::distribute() {
   const DistributionStatus status = result.status;
   const bool answered_accurately = distributeBy(accurate_solver);
   if (answered_accurately && (!proved || result.isOptimal(kProof))) return true;
-  // An answer without proof is one if there is none better, but not if there was no time for it.
+  // Then the first answer is the one. Without proof it is not, if there was no time for a better
+  // one.
   const bool had_time = result.iterations < maximal_iterations;
-  if (had_time && !answered_accurately) {
+  if (answered && (proved || had_time)) {
     result.status = status;
-    return answered;
+    if (answered_accurately) writeAnswer(solver);
+    return true;
   }
-  if (had_time && distributeBy(solver)) return true;
   result.status = DistributionStatus::NumericalFailure;
   for (std::size_t k = 0; k < solved.size(); ++k)
     result.contacts[k].force = slots[solved[k]].former_force;
@@ -476,9 +488,14 @@ bool WrenchDistribution::Workspace::distributeBy(TwoStageSolver<Scalar>& solver)
                                maximal_iterations - result.iterations);
   result.iterations += solver.iterations();
   if (result.status == DistributionStatus::NumericalFailure) return false;
+  writeAnswer(solver);
+  return true;
+}
+
+template <class Scalar>
+void WrenchDistribution::Workspace::writeAnswer(TwoStageSolver<Scalar>& solver) {
   solver.writeAnswer(result, unit, overall_weight);
   sumUp();
-  return true;
 }
 
 bool WrenchDistribution::Workspace::hasFiniteMatrices() const {

@@ -14,6 +14,7 @@
 #include "dynacom/contact_point.hpp"
 #include "dynacom/dyna_com.hpp"
 #include "feet.hpp"
+#include "kept_storage.hpp"
 #include "malloc_counter.hpp"
 #include "random_problems.hpp"
 #include "random_robot.hpp"
@@ -542,4 +543,49 @@ BOOST_AUTO_TEST_CASE(a_distribution_of_the_same_sizes_allocates_nothing) {
       BOOST_TEST(solve(standing.random.vector(6, 1000.)) != DistributionStatus::NumericalFailure);
     }
   }
+}
+
+// --- Kept storage ----------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(kept_storage_allocates_only_to_become_larger_than_ever) {
+  using dynacom::internal::Kept;
+  using dynacom::internal::KeptList;
+  using KeptMatrix = Kept<Eigen::MatrixXd>;
+  using KeptVector = Kept<Eigen::VectorXd>;
+  BOOST_TEST(allocationsIn([] {
+               KeptMatrix matrix;
+               KeptVector vector;
+             }) == 0);
+  const Eigen::MatrixXd large = Eigen::MatrixXd::Ones(6, 8), small = Eigen::MatrixXd::Ones(2, 3),
+                        tall = Eigen::MatrixXd::Ones(48, 1);
+  KeptMatrix matrix, other;
+  BOOST_TEST(allocationsIn([&] { matrix.resize(6, 8); }) > 0);
+  BOOST_TEST(allocationsIn([&] {
+               for (const Eigen::MatrixXd* one : {&large, &small, &tall, &small, &large})
+                 matrix = *one;
+               for (Eigen::Index rows = 0; rows <= 6; ++rows)
+                 for (Eigen::Index cols = 8; cols >= 0; --cols) {
+                   matrix.resize(rows, cols);
+                   matrix.setZero(6 - rows, 8 - cols);
+                 }
+             }) == 0);
+  BOOST_TEST(allocationsIn([&] { matrix.resize(7, 7); }) > 0);
+  BOOST_TEST(allocationsIn([&] { matrix.resize(1, 49); }) == 0);
+  other.resize(5, 10);
+  BOOST_TEST(allocationsIn([&] { other = matrix; }) == 0);
+
+  KeptVector vector;
+  vector.resize(10);
+  BOOST_TEST(allocationsIn([&] {
+               for (const Eigen::Index size : {3, 0, 10, 7}) vector.setConstant(size, 1.);
+             }) == 0);
+
+  KeptList<KeptVector> list;
+  list.resize(3);
+  for (std::size_t k = 0; k < 3; ++k) list[k].setZero(4);
+  BOOST_TEST(allocationsIn([&] {
+               for (const std::size_t size : {1, 0, 2, 3}) list.resize(size);
+               list[1].setZero(2);
+               list[1].setZero(4);
+             }) == 0);
 }

@@ -303,6 +303,44 @@ BOOST_AUTO_TEST_CASE(where_no_inequality_is_active_one_step_is_enough) {
   BOOST_TEST(inside > 50);
 }
 
+BOOST_AUTO_TEST_CASE(a_sole_on_its_own_takes_one_step_to_its_only_force) {
+  Random random(99);
+  int inside = 0, outside = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    DistributionResult result;
+    do result.contacts = feet(random);
+    while (result.contacts.front().A.cols() != 6);
+    result.contacts.resize(1);
+    auto& contact = result.contacts.front();
+    contact.weights = random.vector(6, 0.5, 2.);
+    const Vector6 weights = random.vector(6, 0.5, 2.);
+    Vector6 force = random.vector(6, 0.1);
+    force[2] = 1.;
+    Vector6 wrench = contact.NE * force;
+    force /= weights.cwiseProduct(wrench).norm();
+    wrench = contact.NE * force;
+    DualNewton newton = newtonOf(result.contacts);
+    const DistributionStatus status = newton.solve(result.contacts, weights.cwiseProduct(wrench),
+                                                   weights, trial % 2 == 0, kEnough);
+    if (!((contact.A * force).maxCoeff() <= 0.)) {
+      ++outside;
+      BOOST_TEST(status != DistributionStatus::Solved);
+      continue;
+    }
+    ++inside;
+    BOOST_TEST(status == DistributionStatus::Solved);
+    BOOST_TEST(newton.iterations() == 1);
+    newton.writeAnswer(result, 1., 1.);
+    BOOST_TEST(close(contact.force, force, 1e-13));
+    // W² λ = NEᵀ ν.
+    BOOST_TEST(close(contact.NE.transpose() * result.wrench_multipliers,
+                     contact.weights.cwiseAbs2().cwiseProduct(force), 1e-12));
+    BOOST_TEST(contact.multipliers.isZero(0.));
+  }
+  BOOST_TEST(inside > 100);
+  BOOST_TEST(outside > 100);
+}
+
 BOOST_AUTO_TEST_CASE(from_the_state_of_an_answer_one_step_leads_to_it_again) {
   Random random(96);
   int answers = 0, others = 0;

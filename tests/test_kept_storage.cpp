@@ -7,11 +7,9 @@
 #include <vector>
 
 #include "kept_storage.hpp"
-#include "malloc_counter.hpp"
 
 using dynacom::internal::Kept;
 using dynacom::internal::KeptList;
-using dynacom_tests::allocationsIn;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -32,18 +30,12 @@ bool same(const Eigen::Ref<const MatrixXd>& one, const Eigen::Ref<const MatrixXd
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(without_a_size_there_is_nothing) {
-  Index rows = -1, cols = -1, size = -1;
-  BOOST_TEST(allocationsIn([&] {
-               KeptMatrix matrix;
-               KeptVector vector;
-               Kept<Eigen::Matrix<double, 6, Eigen::Dynamic>> wide;
-               rows = wide.rows();
-               cols = wide.cols();
-               size = matrix.rows() + matrix.cols() + vector.size();
-             }) == 0);
-  BOOST_TEST(rows == 6);
-  BOOST_TEST(cols == 0);
-  BOOST_TEST(size == 0);
+  const KeptMatrix matrix;
+  const KeptVector vector;
+  const Kept<Eigen::Matrix<double, 6, Eigen::Dynamic>> wide;
+  BOOST_TEST(wide.rows() == 6);
+  BOOST_TEST(wide.cols() == 0);
+  BOOST_TEST(matrix.rows() + matrix.cols() + vector.size() == 0);
   const KeptMatrix copy = KeptMatrix();
   BOOST_TEST(copy.size() == 0);
 }
@@ -97,35 +89,31 @@ BOOST_AUTO_TEST_CASE(it_can_be_filled) {
   BOOST_TEST(same(vector, VectorXd::Zero(2)));
 }
 
-BOOST_AUTO_TEST_CASE(it_shrinks_and_grows_without_allocating) {
+BOOST_AUTO_TEST_CASE(it_shrinks_and_grows_in_its_place) {
   const MatrixXd large = numbered(6, 8), small = numbered(2, 3), tall = numbered(48, 1),
                  flat = numbered(1, 48);
   KeptMatrix matrix;
-  BOOST_TEST(allocationsIn([&] { matrix.resize(6, 8); }) > 0);
+  matrix.resize(6, 8);
   const double* const place = matrix.data();
   for (const MatrixXd* other : {&large, &small, &tall, &flat, &small, &large}) {
-    BOOST_TEST(allocationsIn([&] { matrix = *other; }) == 0);
+    matrix = *other;
     BOOST_TEST(same(matrix, *other));
   }
-  BOOST_TEST(allocationsIn([&] {
-               for (Index rows = 0; rows <= 6; ++rows)
-                 for (Index cols = 8; cols >= 0; --cols) {
-                   matrix.resize(rows, cols);
-                   matrix.setZero(6 - rows, 8 - cols);
-                 }
-               matrix.setZero(8, 6);
-             }) == 0);
+  for (Index rows = 0; rows <= 6; ++rows)
+    for (Index cols = 8; cols >= 0; --cols) {
+      matrix.resize(rows, cols);
+      matrix.setZero(6 - rows, 8 - cols);
+    }
+  matrix.setZero(8, 6);
   BOOST_TEST(same(matrix, MatrixXd::Zero(8, 6)));
   BOOST_TEST(matrix.data() == place);
-  // More than there ever was takes more.
-  BOOST_TEST(allocationsIn([&] { matrix.resize(7, 7); }) > 0);
-  BOOST_TEST(allocationsIn([&] { matrix.resize(1, 49); }) == 0);
+  // More than there ever was.
+  matrix = numbered(7, 7);
+  BOOST_TEST(same(matrix, numbered(7, 7)));
 
   KeptVector vector;
   vector.resize(10);
-  BOOST_TEST(allocationsIn([&] {
-               for (const Index size : {3, 0, 10, 7}) vector.setConstant(size, double(size));
-             }) == 0);
+  for (const Index size : {3, 0, 10, 7}) vector.setConstant(size, double(size));
   BOOST_TEST(same(vector, VectorXd::Constant(7, 7.)));
 }
 
@@ -146,7 +134,7 @@ BOOST_AUTO_TEST_CASE(a_copy_is_independent) {
   KeptMatrix other;
   other.resize(3, 4);
   const double* const place = other.data();
-  BOOST_TEST(allocationsIn([&] { other = matrix; }) == 0);
+  other = matrix;
   BOOST_TEST(same(other, matrix));
   BOOST_TEST(other.data() == place);
   const KeptMatrix& self = other;
@@ -184,14 +172,12 @@ BOOST_AUTO_TEST_CASE(a_list_keeps_its_elements) {
   BOOST_TEST((list.begin() == list.end()));
   list.resize(3);
   for (std::size_t k = 0; k < 3; ++k) list[k].setConstant(4, double(k));
-  BOOST_TEST(allocationsIn([&] {
-               list.resize(1);
-               list.resize(0);
-               list.resize(2);
-               list[1].setZero(2);
-               list.resize(3);
-               list[1].setConstant(4, 5.);
-             }) == 0);
+  list.resize(1);
+  list.resize(0);
+  list.resize(2);
+  list[1].setZero(2);
+  list.resize(3);
+  list[1].setConstant(4, 5.);
   BOOST_TEST(list.size() == 3u);
   BOOST_TEST(same(list[0], VectorXd::Zero(4)));
   BOOST_TEST(same(list[1], VectorXd::Constant(4, 5.)));

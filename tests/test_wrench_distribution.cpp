@@ -2575,16 +2575,21 @@ BOOST_AUTO_TEST_CASE(warm_start_survives_that_a_contact_takes_no_part_for_a_whil
     const auto away = static_cast<std::size_t>(random.integer(0, 2));
     const Slots others = {(away + 1) % 3, (away + 2) % 3};
     const Vector6 of_others = total - first.contacts[away].NE * first.contacts[away].force;
-    for (int tick = 0; tick < 3; ++tick) {
-      BOOST_TEST(solveSlots(distribution, contacts, others, of_others) ==
+    for (const int absence : {1, 3, 10, 11}) {
+      for (int tick = 0; tick < absence; ++tick) {
+        BOOST_TEST(solveSlots(distribution, contacts, others, of_others) ==
+                   DistributionStatus::Solved);
+        BOOST_TEST(distribution.result().iterations == 1);
+      }
+      // Back again, as the last one now, it still knows what it did, but not for ever.
+      BOOST_TEST(solveSlots(distribution, contacts, {others[0], others[1], away}, total) ==
                  DistributionStatus::Solved);
-      BOOST_TEST(distribution.result().iterations == 1);
+      if (absence <= 10)
+        BOOST_TEST(distribution.result().iterations == 1);
+      else
+        BOOST_TEST(distribution.result().iterations > 1);
+      BOOST_TEST(close(distribution.result().contacts[2].force, first.contacts[away].force, 1e-9));
     }
-    // Back again, as the last one now, it still knows what it did.
-    BOOST_TEST(solveSlots(distribution, contacts, {others[0], others[1], away}, total) ==
-               DistributionStatus::Solved);
-    BOOST_TEST(distribution.result().iterations == 1);
-    BOOST_TEST(close(distribution.result().contacts[2].force, first.contacts[away].force, 1e-9));
   }
   BOOST_TEST(cold_iterations > 3 * trials);
 }
@@ -2654,6 +2659,105 @@ BOOST_AUTO_TEST_CASE(no_more_iterations_are_taken_than_are_allowed) {
   BOOST_TEST(asked[2] + asked[3] > 15);
   BOOST_TEST(answers > 10000);
   BOOST_TEST(failures > 2000);
+}
+
+BOOST_AUTO_TEST_CASE(under_any_cap_a_warm_start_answers_where_a_cold_one_does) {
+  long attempts_in_vain = 0, answers = 0, only_warm = 0, failures = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    Walk walk(700 + seed, seed % 2 == 1);
+    WrenchDistribution warm, cold;
+    cold.setWarmStart(false);
+    reserveAll(warm, walk.contacts());
+    reserveAll(cold, walk.contacts());
+    for (int step = 0; step < 40; ++step) {
+      walk.step();
+      for (int limit = 1; limit <= 8; ++limit) {
+        WrenchDistribution limited = warm, limited_cold = cold;
+        for (WrenchDistribution* one : {&limited, &limited_cold}) one->setMaximalIterations(limit);
+        const DistributionStatus status = walk.solve(limited), expected = walk.solve(limited_cold);
+        const int iterations = limited.result().iterations;
+        BOOST_TEST_CONTEXT("walk " << seed << ", step " << step << ", limit " << limit) {
+          BOOST_TEST(iterations <= limit);
+          BOOST_TEST(limited_cold.result().iterations <= limit);
+          if (expected == DistributionStatus::NumericalFailure) {
+            (status == expected ? failures : only_warm) += 1;
+          } else {
+            ++answers;
+            if (iterations > limited_cold.result().iterations) ++attempts_in_vain;
+            BOOST_TEST(status == expected);
+            const double scale = limited.result().scale;
+            BOOST_TEST(close(limited.result().forces() / scale,
+                             limited_cold.result().forces() / scale, 1e-9));
+          }
+        }
+      }
+      walk.solve(warm);
+      walk.solve(cold);
+    }
+  }
+  BOOST_TEST(attempts_in_vain > 500);
+  BOOST_TEST(answers > 5000);
+  BOOST_TEST(only_warm > 500);
+  BOOST_TEST(failures > 500);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_proved_is_an_answer_though_there_was_no_time_for_more_digits) {
+  // Level soles, all at the same limit of friction, but for very little.
+  Random random(206);
+  const Contacts contacts = {makeSole({0., 0.1, -1.}), makeSole({0., -0.1, -1.})};
+  int proofs = 0, cut_short = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const double beyond = (random.coin() ? 1. : -1.) * std::pow(10., random.uniform(-13., -4.));
+    Vector6 total = Vector6::Zero();
+    for (const auto& contact : contacts) {
+      const double mu = -contact->fri_A()(0, 2);
+      total += random.uniform(100., 500.) *
+               (contact->ne_A().col(2) + mu * (1. + beyond) * contact->ne_A().col(0) +
+                random.uniform(-mu, mu) * contact->ne_A().col(1));
+    }
+    WrenchDistribution distribution;
+    distribution.setWarmStart(false);
+    solve(distribution, contacts, total);
+    const DistributionResult right = distribution.result();
+    if (countAskedSolvers(right) != 3) continue;
+
+    // What the solver before the last one says.
+    DistributionResult proof = right;
+    const Vector6 weights = Vector6::Ones();
+    internal::TwoStageSolver<double> solver;
+    solver.setProblem(proof.contacts, weights);
+    proof.status = solver.solve(total / right.scale, WrenchDistribution::kMaximalIterations);
+    if (proof.status == DistributionStatus::NumericalFailure) continue;
+    solver.writeAnswer(proof, right.scale, 1.);
+    proof.achieved.setZero();
+    for (const auto& contact : proof.contacts) proof.achieved += contact.NE * contact.force;
+    proof.residual = total - proof.achieved;
+    if (!proof.isOptimal(1e-8)) continue;
+
+    for (const int cap : {20, 50}) {
+      distribution.setMaximalIterations(cap);
+      solve(distribution, contacts, total);
+      const DistributionResult& result = distribution.result();
+      BOOST_TEST(result.iterations <= cap);
+      if (result.status == DistributionStatus::NumericalFailure) {
+        // Then there was no time for the proof: what led to it is more than the cap.
+        internal::DualNewton newton;
+        newton.reserve(2);
+        for (std::size_t slot = 0; slot < 2; ++slot) newton.setContact(slot, right.contacts[slot]);
+        newton.setActive({0, 1}, right.contacts);
+        newton.solve(right.contacts, total / right.scale, weights, false, cap);
+        BOOST_TEST(newton.iterations() + solver.iterations() > cap);
+        continue;
+      }
+      ++proofs;
+      if (right.iterations > cap) ++cut_short;
+      BOOST_TEST(result.isOptimal(1e-8));
+      BOOST_TEST(close(result.forces() / right.scale, right.forces() / right.scale, 1e-3));
+    }
+  }
+  BOOST_TEST(proofs > 50);
+  BOOST_TEST(cut_short > 50);
+  BOOST_TEST_MESSAGE(proofs << " proofs, " << cut_short << " of them instead of more digits");
 }
 
 BOOST_AUTO_TEST_CASE(without_an_answer_before_forces_are_zero_when_iterations_are_used_up) {

@@ -99,11 +99,15 @@ class DYNACOM_EXPORT DynaCoM {
   void setWrenchWeights(const Vector6& weights) { distribution_.setWrenchWeights(weights); }
 
   /// Whether a distribution starts from the inequalities that were active in the last one, contact
-  /// by contact, see WrenchDistribution::setWarmStart().
+  /// by contact, as is the default; also of a contact that was deactivated in between, if it missed
+  /// no more than ten distributions. See WrenchDistribution::setWarmStart().
   bool getWarmStart() const { return distribution_.getWarmStart(); }
   void setWarmStart(bool warmStart) { distribution_.setWarmStart(warmStart); }
 
-  /// How many iterations a distribution may take, see WrenchDistribution::setMaximalIterations().
+  /// How many iterations a distribution may take, WrenchDistribution::kMaximalIterations by
+  /// default. That is for those who can wait: a controller sets 50, or what docs/real_time.md says
+  /// of the time that it has. What needs more ends as DistributionStatus::NumericalFailure, and the
+  /// forces stay those of the last answer. See WrenchDistribution::setMaximalIterations().
   int getMaximalIterations() const { return distribution_.getMaximalIterations(); }
   /// @throws std::invalid_argument unless maximalIterations > 0
   void setMaximalIterations(int maximalIterations) {

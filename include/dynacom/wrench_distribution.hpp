@@ -70,8 +70,8 @@ struct DYNACOM_EXPORT DistributionResult {
   Vector6 wrench_weights = Vector6::Ones();    ///< D
   double scale = kNaN;                         ///< of ‖D w‖, what tolerances are relative to
   double cost = kNaN;                          ///< ½ Σ (wᵢ λᵢ)²
-  int iterations = 0;                          ///< steps of all solvers that were asked
-  std::vector<Contact> contacts;               ///< in the order of WrenchDistribution::add()
+  int iterations = 0;  ///< of all solvers that were asked, at most as many as are allowed
+  std::vector<Contact> contacts;  ///< in the order of WrenchDistribution::add()
   /// Multipliers ν of NE λ = achieved in the minimum of the cost: W² λ = NEᵀ ν − Aᵀ μ.
   Vector6 wrench_multipliers = Vector6::Constant(kNaN);
 
@@ -118,6 +118,8 @@ class DYNACOM_EXPORT WrenchDistribution {
  public:
   using Vector6 = DistributionResult::Vector6;
 
+  /// How many iterations solve() may take unless setMaximalIterations() says otherwise: more than
+  /// any random problem has taken. For those who can wait; a controller sets less.
   static constexpr int kMaximalIterations = 100000;
 
   WrenchDistribution();
@@ -135,14 +137,17 @@ class DYNACOM_EXPORT WrenchDistribution {
   const Vector6& getWrenchWeights() const;
 
   /// Whether solve() starts from the inequalities that were active in each slot's last answer, as
-  /// is the default; else it starts with none. That changes how long it takes, and answers by no
-  /// more than rounding.
+  /// is the default; else it starts with none. A slot that takes no part in up to ten solve() still
+  /// knows its own afterwards; after more it starts with none, as a foot does that comes down from
+  /// a step. That changes how long it takes, and answers by no more than rounding.
   void setWarmStart(bool warmStart);
   bool getWarmStart() const;
 
   /// How many iterations solve() may take, kMaximalIterations by default: those of
   /// DistributionResult::iterations. Of feet on level ground nearly all problems take less than 10;
-  /// a problem that needs more than this ends as DistributionStatus::NumericalFailure.
+  /// a problem that needs more than this ends as DistributionStatus::NumericalFailure. A controller
+  /// sets 50, or what docs/real_time.md says of the time that it has. A warm start finds its answer
+  /// within the same number as a cold one: one or two iterations that it takes in vain come on top.
   /// @throws std::invalid_argument unless maximalIterations > 0
   void setMaximalIterations(int maximalIterations);
   int getMaximalIterations() const;

@@ -18,6 +18,14 @@ from motion_files import G1_FILE, TOY_FILE, TOY_URDF
 ROOT = Path(__file__).parents[2]
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--pictures",
+        action="store_true",
+        help="keep in docs/ the pictures that tests of pages take",
+    )
+
+
 @pytest.fixture(scope="session")
 def root() -> Path:
     """The repository."""
