@@ -3,25 +3,26 @@
 
 A settings file is YAML; what it does not name stays at its default::
 
-    cutoff: 6.0           # of the filter [Hz]
+    cutoff: 6.0           # of the filter [Hz]; null for none
     omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
     flat: true            # the ground is flat and horizontal: see the CoP
     detection:            # DetectionSettings, field by field
       height: 0.015
+      ground_height: null # [m]; null if it is to be estimated
     verdict:              # VerdictSettings: a limit, and the part of the frames that may exceed it
-      residual_force: {limit: 0.1, allowed_share: 0.02}
+      residual_force: {limit: 0.1, allowed_share: 0.05}
       near_ground: 0.06
 """
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from dynacom.dynacom_pywrap import DetectionSettings, FaultLimit, VerdictSettings
 from dynacom.errors import DynacomError
+from dynacom.yaml_file import is_number, parse_yaml, read_yaml
 
 
 @dataclass
@@ -38,8 +39,17 @@ class AnalysisOptions:
     detection: DetectionSettings = field(default_factory=DetectionSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
 
+    def validate(self) -> None:
+        """Raises ValueError, naming the first setting out of its range."""
+        if self.cutoff is not None and not (math.isfinite(self.cutoff) and self.cutoff > 0.0):
+            raise ValueError(f"cutoff must be finite and > 0 Hz, or none, got {self.cutoff:g}")
+        if not (math.isfinite(self.omega) and self.omega >= 0.0):
+            raise ValueError(f"omega must be finite and >= 0 rad/s, got {self.omega:g}")
+        self.detection.validate()
+        self.verdict.validate()
+
     def update(self, values: Any, where: str) -> None:
-        """Changes some of the settings.
+        """Changes some of the settings; all of them or, where it raises, none.
 
         Args:
             values: a mapping as in a settings file.
@@ -48,12 +58,7 @@ class AnalysisOptions:
         Raises:
             DynacomError: a name is none of a setting, or a value none that it can have.
         """
-        _update(self, values, where)
-        try:
-            self.detection.validate()
-            self.verdict.validate()
-        except ValueError as error:
-            raise DynacomError(f"{where}: {error}") from error
+        self._update([(values, where)], where)
 
     def update_from_file(self, path: str | Path) -> None:
         """Changes the settings that a file names.
@@ -61,12 +66,7 @@ class AnalysisOptions:
         Raises:
             DynacomError: the file cannot be read, and as :meth:`update`.
         """
-        try:
-            content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise DynacomError(f"{path}: cannot be read ({error.strerror})") from error
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise DynacomError(f"{path}: must be YAML ({error})") from error
+        content = read_yaml(path)
         self.update({} if content is None else content, str(path))
 
     def update_from_texts(self, texts: Iterable[str]) -> None:
@@ -75,17 +75,30 @@ class AnalysisOptions:
         Raises:
             DynacomError: a text is none of that form, and as :meth:`update`.
         """
+        changes = []
         for text in texts:
             path, equals, value = text.partition("=")
-            try:
-                content = yaml.safe_load(value)
-            except yaml.YAMLError:
-                content = value
-            if not equals:
+            if not equals or not value:
                 raise DynacomError(f"setting must be NAME=VALUE, got '{text}'")
+            try:
+                content = parse_yaml(value)
+            except ValueError:
+                content = value
             for name in reversed(path.split(".")):
                 content = {name: content}
-            self.update(content, f"setting '{text}'")
+            changes.append((content, f"setting '{text}'"))
+        self._update(changes, "settings")
+
+    def _update(self, changes: list[tuple[Any, str]], where: str) -> None:
+        # What is in range depends on other settings: it is looked at when all have been changed.
+        changed = replace(self, detection=self.detection.copy(), verdict=self.verdict.copy())
+        for values, place in changes:
+            _update(changed, values, place)
+        try:
+            changed.validate()
+        except ValueError as error:
+            raise DynacomError(f"{where}: {error}") from error
+        vars(self).update(vars(changed))
 
     def to_dict(self) -> dict[str, Any]:
         """The settings, as a settings file would hold them."""
@@ -105,9 +118,17 @@ def _names(group: Any) -> list[str]:
 def _to_dict(group: Any) -> dict[str, Any]:
     values = {name: getattr(group, name) for name in _names(group)}
     return {
-        name: _to_dict(value) if isinstance(value, _GROUPS) else value
+        name: _to_dict(value) if isinstance(value, _GROUPS) else _without_nan(value)
         for name, value in values.items()
     }
+
+
+def _without_nan(value: float | None) -> float | None:
+    return None if value is None or math.isnan(value) else value
+
+
+# What null stands for, where it may.
+_NULL = {"cutoff": None, "ground_height": math.nan}
 
 
 def _update(group: Any, values: Any, where: str) -> None:
@@ -125,9 +146,10 @@ def _update(group: Any, values: Any, where: str) -> None:
             if not isinstance(value, bool):
                 raise DynacomError(f"{where}: {name} must be true or false, got {value!r}")
             setattr(group, name, value)
-        elif value is None and name == "cutoff":
-            setattr(group, name, None)
-        elif isinstance(value, int | float) and not isinstance(value, bool):
+        elif value is None and name in _NULL:
+            setattr(group, name, _NULL[name])
+        elif is_number(value):
             setattr(group, name, float(value))
         else:
-            raise DynacomError(f"{where}: {name} must be a number, got {value!r}")
+            expected = "a finite number or null" if name in _NULL else "a finite number"
+            raise DynacomError(f"{where}: {name} must be {expected}, got {value!r}")

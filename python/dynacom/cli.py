@@ -209,7 +209,8 @@ def analyze(
         trust=trust,
         clip=clip_name,
     )
-    files = report.save(out or Path(f"{clip.name.split('.')[0]}-analysis"), csv=csv, page=page)
+    name = Path(clip.name.removesuffix(".gz")).stem
+    files = report.save(out or Path(f"{name}-analysis"), csv=csv, page=page)
     console = Console()
     console.print(summary_table(report.summary))
     for file in files:

@@ -83,8 +83,9 @@ _MEASURED_COLUMNS = (("measured_force", _XYZ, "N"), ("measured_torque", _XYZ, "N
 # more than rounding, and a landing is a step in velocity.
 _VELOCITY_MISMATCH = 0.05
 _ACCELERATION_MISMATCH = 0.2
-# By what part of itself a step of time may differ where the frame rate is even.
-_EVEN = 0.02
+# How far a frame may be from where an even frame rate puts it, in frames, to be taken for there:
+# times are often rounded to milliseconds.
+_EVEN = 0.1
 
 _FAULTS = {
     "residual_force": ("m g", "the contacts cannot give the force"),
@@ -115,7 +116,7 @@ class MotionReport:
     verdict: MotionVerdict
     #: By name, see docs/columns.md: ``com`` (T, 3), ``contact.left_sole.force`` (T, 3), ...
     arrays: dict[str, np.ndarray] = field(repr=False)
-    #: What summary.json holds.
+    #: What summary.json holds: docs/verdict.md.
     summary: dict[str, Any] = field(repr=False)
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -176,7 +177,7 @@ class MotionReport:
                 self._write_parquet(temporary / "frames.parquet")
                 if csv:
                     self._write_csv(temporary / "frames.csv")
-                text = json.dumps(_without_nan(self.summary), indent=2, ensure_ascii=False)
+                text = json.dumps(self.summary, indent=2, ensure_ascii=False, allow_nan=False)
                 (temporary / "summary.json").write_text(text + "\n", encoding="utf-8")
                 write_schedule(self.schedule, self.motion.time, temporary / "schedule.yaml")
                 if page:
@@ -258,6 +259,7 @@ def analyze(
         ValueError: options are out of their ranges.
     """
     options = options or AnalysisOptions()
+    options.validate()
     if not isinstance(robot, Robot):
         robot = load_robot(robot)
     if not isinstance(motion, Clip):
@@ -359,27 +361,43 @@ def _analyze(
         "options": options.to_dict(),
     }
     return MotionReport(
-        clip, robot, options, derived.motion, schedule, analysis, verdict, arrays, summary
+        clip,
+        robot,
+        options,
+        derived.motion,
+        schedule,
+        analysis,
+        verdict,
+        arrays,
+        _without_nan(summary),
     )
 
 
 # Derivatives.
 
 
-def _frame_rate(time: np.ndarray) -> float | None:
-    """Frames per second, where they are evenly spaced [Hz]."""
+def _even_times(time: np.ndarray) -> np.ndarray | None:
+    """The times of an even frame rate, where these are that but for rounding."""
     if len(time) < 2:
         return None
-    steps = np.diff(time)
-    mean = steps.mean()
-    return float(1.0 / mean) if np.abs(steps - mean).max() <= _EVEN * mean else None
+    even, step = np.linspace(time[0], time[-1], len(time), retstep=True)
+    return even if np.ptp(time - even) <= 2.0 * _EVEN * step else None
+
+
+def _frame_rate(time: np.ndarray) -> float | None:
+    """Frames per second, where they are evenly spaced [Hz]."""
+    if _even_times(time) is None:
+        return None
+    return float((len(time) - 1) / (time[-1] - time[0]))
 
 
 def _recompute(clip: Clip, robot: Robot, cutoff: float | None) -> Motion:
-    if cutoff is None:
-        return differentiate(robot.model, clip.time, clip.q)
-    q = filterConfigurations(robot.model, clip.q, _frame_rate(clip.time), cutoff)
-    return differentiate(robot.model, clip.time, q)
+    q, rate = clip.q, _frame_rate(clip.time)
+    if cutoff is not None:
+        q = filterConfigurations(robot.model, q, rate, cutoff)
+    time = clip.time if rate is None else _even_times(clip.time)
+    motion = differentiate(robot.model, time, q)
+    return Motion(clip.time, motion.q, motion.v, motion.a)
 
 
 def _derive(clip: Clip, robot: Robot, cutoff: float | None) -> _Derived:
@@ -413,6 +431,8 @@ def _derive(clip: Clip, robot: Robot, cutoff: float | None) -> _Derived:
         if cutoff is None
         else f"after a Butterworth filter of 4th order, forward and backward, at {cutoff:g} Hz"
     )
+    if rate is not None and (error := np.abs(clip.time - _even_times(clip.time)).max()) > 1e-6:
+        how += f", with times made even, by up to {1e3 * error:.2g} ms"
     text = f"Velocities and accelerations are computed from the positions, {how}: {reason}."
     return _Derived(_recompute(clip, robot, cutoff), cutoff, text)
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """Results that appear whole, or not at all."""
 
+import errno
 import os
 import secrets
 import shutil
@@ -17,21 +18,39 @@ def results_folder(path: Path) -> Iterator[Path]:
     replaced, others stay.
 
     Raises:
-        OSError: path is not a folder, or cannot be written to.
+        OSError: path is not a folder, or cannot be written to, or has a folder where a file shall
+            be.
     """
-    existed, finished = path.exists(), False
+    made = [folder for folder in (path, *path.parents) if not folder.exists()]
     # Inside, so that it is on the same file system and needs no right to write elsewhere. Its name
     # is known before it is made: an interruption may come at any time.
     temporary = path / f".dynacom-{secrets.token_hex(8)}"
+    results, replaced = temporary / "results", temporary / "replaced"
+    names, finished = [], False
     try:
         path.mkdir(parents=True, exist_ok=True)
         temporary.mkdir()
-        yield temporary
-        for file in sorted(temporary.iterdir()):
-            os.replace(file, path / file.name)
+        results.mkdir()
+        replaced.mkdir()
+        yield results
+        names = sorted(file.name for file in results.iterdir())
+        for name in names:
+            if (path / name).is_dir():
+                raise IsADirectoryError(errno.EISDIR, f"{name} is a folder")
+        for name in names:
+            if (path / name).exists():
+                os.replace(path / name, replaced / name)
+            os.replace(results / name, path / name)
         finished = True
     finally:
+        if not finished:
+            for name in names:
+                if not (results / name).exists():
+                    (path / name).unlink()
+                if (replaced / name).exists():
+                    os.replace(replaced / name, path / name)
         shutil.rmtree(temporary, ignore_errors=True)
-        if not existed and not finished:
-            with suppress(OSError):
-                path.rmdir()
+        if not finished:
+            for folder in made:
+                with suppress(OSError):
+                    folder.rmdir()

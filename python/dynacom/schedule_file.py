@@ -4,11 +4,13 @@
 A file names the times at which each contact is active, in seconds::
 
     left_sole: [[0.0, 0.98], [1.72, 2.5]]
-    right_sole: []
+    right_sole:
+    - [0.5, 2.016667]
 
 A contact is active in all frames from the first time to the second, both included.
 """
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,8 +20,9 @@ import yaml
 
 from dynacom.dynacom_pywrap import ContactSchedule
 from dynacom.errors import DynacomError
+from dynacom.yaml_file import is_number, read_yaml
 
-# By what part of a frame times may be rounded.
+# By what part of a frame times may be rounded; a single frame has a second.
 _ROUNDING = 1e-3
 
 
@@ -33,8 +36,12 @@ def write_schedule(schedule: ContactSchedule, time: np.ndarray, path: str | Path
         OSError: the file cannot be written.
     """
     lines = ["# When each contact is active [s]: the first and the last frame of each time.\n"]
+    digits = max(6, math.ceil(-math.log10(0.1 * _tolerance(time))))
     for name, active in zip(schedule.names, np.asarray(schedule.active).T, strict=True):
-        intervals = [[float(time[first]), float(time[last])] for first, last in _runs(active)]
+        intervals = [
+            [round(float(time[first]), digits), round(float(time[last]), digits)]
+            for first, last in _runs(active)
+        ]
         lines.append(yaml.safe_dump({name: intervals}, default_flow_style=None, width=10**6))
     Path(path).write_text("".join(lines), encoding="utf-8")
 
@@ -50,20 +57,14 @@ def read_schedule(path: str | Path, time: np.ndarray, contacts: Sequence[str]) -
         DynacomError: the file cannot be read, or is no schedule of these contacts; the message
             names the contact, what was expected and what was got.
     """
-    path = Path(path)
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DynacomError(f"{path}: cannot be read ({error.strerror})") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise DynacomError(f"{path}: must be YAML ({error})") from error
+    content = read_yaml(path)
     if not isinstance(content, dict):
         raise DynacomError(f"{path}: must be a mapping of contacts to times, got {content!r}")
     if unknown := [name for name in content if name not in contacts]:
         raise DynacomError(
             f"{path}: contact must be one of {', '.join(contacts)}, got {unknown[0]!r}"
         )
-    tolerance = _ROUNDING * (np.diff(time).min() if len(time) > 1 else 0.0)
+    tolerance = _tolerance(time)
     active = np.zeros((len(time), len(contacts)), dtype=bool)
     for name, intervals in content.items():
         for first, last in _read_intervals(intervals, f"{path}: contact '{name}'"):
@@ -72,15 +73,16 @@ def read_schedule(path: str | Path, time: np.ndarray, contacts: Sequence[str]) -
     return ContactSchedule(list(contacts), active)
 
 
+def _tolerance(time: np.ndarray) -> float:
+    """By how much times may be rounded [s]."""
+    return _ROUNDING * float(np.diff(time).min() if len(time) > 1 else 1.0)
+
+
 def _read_intervals(value: Any, where: str) -> list[tuple[float, float]]:
     pairs = value if isinstance(value, list) else [value]
     for pair in pairs:
-        numbers = pair if isinstance(pair, list) and len(pair) == 2 else [None]
-        is_pair = all(
-            isinstance(x, int | float) and not isinstance(x, bool) and np.isfinite(x)
-            for x in numbers
-        )
-        if not is_pair or numbers[0] > numbers[1]:
+        is_pair = isinstance(pair, list) and len(pair) == 2 and all(map(is_number, pair))
+        if not is_pair or pair[0] > pair[1]:
             raise DynacomError(
                 f"{where}: must be a list of times [first, last], first <= last, got {pair!r}"
             )
