@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """What a motion asks of the ground, frame by frame and as a whole."""
 
-import csv
 import json
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -174,9 +173,7 @@ class MotionReport:
         folder = Path(folder)
         try:
             with results_folder(folder) as temporary:
-                self._write_parquet(temporary / "frames.parquet")
-                if csv:
-                    self._write_csv(temporary / "frames.csv")
+                self._write_tables(temporary, csv)
                 text = json.dumps(self.summary, indent=2, ensure_ascii=False, allow_nan=False)
                 (temporary / "summary.json").write_text(text + "\n", encoding="utf-8")
                 write_schedule(self.schedule, self.motion.time, temporary / "schedule.yaml")
@@ -197,10 +194,11 @@ class MotionReport:
             ) from error
         return [folder / name for name in names]
 
-    def _write_parquet(self, path: Path) -> None:
+    def _write_tables(self, folder: Path, with_csv: bool) -> None:
+        """frames.parquet, and frames.csv."""
         try:
             import pyarrow
-            import pyarrow.parquet
+            from pyarrow import csv, parquet
         except ImportError as error:
             raise DynacomError(
                 "frames.parquet needs pyarrow: pip install dynacom[motion]"
@@ -212,18 +210,15 @@ class MotionReport:
             arrays.append(array)
         metadata = {"clip": self.summary["clip"], "robot": self.robot.name}
         table = pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields, metadata))
-        pyarrow.parquet.write_table(table, path)
-
-    def _write_csv(self, path: Path) -> None:
-        columns = self.columns()
-        cells = [
-            values.astype(int).tolist() if values.dtype.kind == "b" else values.tolist()
-            for values, _ in columns.values()
-        ]
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(zip(*cells, strict=True))
+        parquet.write_table(table, folder / "frames.parquet")
+        if with_csv:
+            numbers = [
+                array.cast(pyarrow.int8()) if array.type == pyarrow.bool_() else array
+                for array in arrays
+            ]
+            csv.write_csv(
+                pyarrow.Table.from_arrays(numbers, names=table.column_names), folder / "frames.csv"
+            )
 
 
 def analyze(
