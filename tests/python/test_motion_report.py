@@ -711,7 +711,7 @@ def test_other_files_stay(report, tmp_path):
 
 @pytest.mark.parametrize("existed", [False, True])
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(28, "No space left on device")])
-@pytest.mark.parametrize("step", ["_write_parquet", "_write_csv", "write_schedule"])
+@pytest.mark.parametrize("step", ["_write_tables", "write_schedule"])
 def test_all_files_or_none(report, tmp_path, monkeypatch, existed, error, step):
     """Whatever fails, and whenever Ctrl-C comes."""
     out = tmp_path / "out"
