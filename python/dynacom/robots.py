@@ -87,6 +87,8 @@ class Robot:
     model: pin.Model = field(repr=False)
     #: Contact's name -> its settings, in the order of the file.
     contacts: Mapping[str, ContactSettings]
+    #: The file that the model was read from; it says where the meshes are.
+    urdf: Path
 
     def dynacom(self, inactive: Iterable[str] = ()) -> DynaCoM:
         """A new DynaCoM of this robot, which knows all its contacts.
@@ -128,14 +130,15 @@ def load_robot(name_or_path: str | Path) -> Robot:
             file, the contact and the key, what was expected and what was got.
     """
     file = read_robot_file(_find_robot_file(name_or_path))
-    model = _read_urdf(file)
+    urdf = _find_urdf(file)
+    model = _read_urdf(file.path, urdf)
     contacts = {}
     for entry in file.contacts:
         frame = _find_frame(model, entry, file.path)
         if entry.placement is not None:
             entry.settings.frame_name = _add_frame(model, frame, entry, file.path)
         contacts[entry.name] = entry.settings
-    return Robot(file.name, model, contacts)
+    return Robot(file.name, model, contacts, urdf)
 
 
 def read_robot_file(path: str | Path) -> RobotFile:
@@ -329,13 +332,13 @@ def _find_urdf(file: RobotFile) -> Path:
     )
 
 
-def _read_urdf(file: RobotFile) -> pin.Model:
+def _read_urdf(path: Path, urdf: Path) -> pin.Model:
     settings = DynaCoMSettings()
-    settings.urdf = str(_find_urdf(file))
+    settings.urdf = str(urdf)
     try:
         return DynaCoM(settings).getModel().copy()
     except ValueError as error:
-        raise DynacomError(f"{file.path}: urdf: {error}") from error
+        raise DynacomError(f"{path}: urdf: {error}") from error
 
 
 def _find_frame(model: pin.Model, entry: ContactEntry, path: Path) -> int:
