@@ -15,6 +15,14 @@ from dynacom.robots import Robot
 ROOT = Path(__file__).parents[2]
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--pictures",
+        action="store_true",
+        help="keep in docs/ the pictures that tests of pages take",
+    )
+
+
 @pytest.fixture(scope="session")
 def root() -> Path:
     """The repository."""
