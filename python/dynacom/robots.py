@@ -97,6 +97,7 @@ class Robot:
     model: pin.Model = field(repr=False)
     #: Contact's name -> its settings, in the order of the file.
     contacts: Mapping[str, ContactSettings]
+<<<<<<< HEAD
     #: The file that the model was read from.
     urdf: Path
     #: (nq,) What joints are where nothing is known of them: neutral, or as the robot file says.
@@ -104,6 +105,10 @@ class Robot:
     #: Names of joints, in their order, of the robot's smaller versions: for motions that have fewer
     #: joints than the robot, and no names. No two are equally long.
     joint_layouts: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
+=======
+    #: The file that the model was read from; it says where the meshes are.
+    urdf: Path
+>>>>>>> h-page
 
     def dynacom(self, inactive: Iterable[str] = ()) -> DynaCoM:
         """A new DynaCoM of this robot, which knows all its contacts.
@@ -181,6 +186,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
             file, the contact and the key, what was expected and what was got.
     """
     file = read_robot_file(_find_robot_file(name_or_path))
+<<<<<<< HEAD
     urdf = _find_urdf(file.urdf, file.path.parent, f"{file.path}: urdf", "a file beside this one")
     return _make_robot(file, urdf)
 
@@ -228,6 +234,17 @@ def parse_payload(text: str) -> Payload:
     if payload is None or not frame:
         raise DynacomError(f"payload must be FRAME:MASS or FRAME:MASS@x,y,z, got '{text}'")
     return payload
+=======
+    urdf = _find_urdf(file)
+    model = _read_urdf(file.path, urdf)
+    contacts = {}
+    for entry in file.contacts:
+        frame = _find_frame(model, entry, file.path)
+        if entry.placement is not None:
+            entry.settings.frame_name = _add_frame(model, frame, entry, file.path)
+        contacts[entry.name] = entry.settings
+    return Robot(file.name, model, contacts, urdf)
+>>>>>>> h-page
 
 
 def read_robot_file(path: str | Path) -> RobotFile:
@@ -465,6 +482,7 @@ def _find_urdf(urdf: str, folder: Path, where: str, place: str) -> Path:
     )
 
 
+<<<<<<< HEAD
 def _make_robot(file: RobotFile, urdf: Path) -> Robot:
     model = _read_urdf(urdf, file.path)
     default = _make_default(model, file)
@@ -480,6 +498,9 @@ def _make_robot(file: RobotFile, urdf: Path) -> Robot:
 
 
 def _read_urdf(urdf: Path, path: Path) -> pin.Model:
+=======
+def _read_urdf(path: Path, urdf: Path) -> pin.Model:
+>>>>>>> h-page
     settings = DynaCoMSettings()
     settings.urdf = str(urdf)
     try:
