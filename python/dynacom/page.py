@@ -79,11 +79,7 @@ def write_page(
         sensitivity=_sensitivity(summary),
         measured=_measured(summary),
         key=_key(robot),
-<<<<<<< HEAD
-        dashed="; dashed: the file's" if summary["measured"] else "",
-=======
         dashed="; dashed: the file's" if any(c["measured"] for c in data["contacts"]) else "",
->>>>>>> h-page
         scene_class="" if recording else "none",
         data=_json(data),
         # One row a column, the time in double precision.
@@ -132,14 +128,6 @@ def _css(color: tuple[int, int, int]) -> str:
 # ---- What is plotted ----
 
 
-<<<<<<< HEAD
-def _weight(robot: Robot, summary: Mapping[str, Any]) -> float:
-    """m g [N]; 1 for robots without, whose forces are zero."""
-    return summary["mass"] * float(np.linalg.norm(robot.model.gravity.linear)) or 1.0
-
-
-=======
->>>>>>> h-page
 def _statuses(arrays: Mapping[str, np.ndarray]) -> list[str]:
     return sorted({str(status) for status in arrays["status"]})
 
@@ -148,11 +136,7 @@ def _columns(
     robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
     """What page.js plots: name -> a value per frame. The first is `time`."""
-<<<<<<< HEAD
-    weight = _weight(robot, summary)
-=======
     weight = scene.weight(robot, summary)
->>>>>>> h-page
     statuses = _statuses(arrays)
     columns = {
         "time": arrays["time"],

@@ -38,6 +38,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
+import yaml
 
 from dynacom.dynacom_pywrap import (
     Contact6D,
@@ -48,7 +49,6 @@ from dynacom.dynacom_pywrap import (
     DynaCoMSettings,
 )
 from dynacom.errors import DynacomError
-from dynacom.yaml_file import is_number, read_yaml
 
 ContactSettings: TypeAlias = ContactPointSettings | Contact6DSettings
 
@@ -97,7 +97,6 @@ class Robot:
     model: pin.Model = field(repr=False)
     #: Contact's name -> its settings, in the order of the file.
     contacts: Mapping[str, ContactSettings]
-<<<<<<< HEAD
     #: The file that the model was read from.
     urdf: Path
     #: (nq,) What joints are where nothing is known of them: neutral, or as the robot file says.
@@ -105,10 +104,6 @@ class Robot:
     #: Names of joints, in their order, of the robot's smaller versions: for motions that have fewer
     #: joints than the robot, and no names. No two are equally long.
     joint_layouts: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
-=======
-    #: The file that the model was read from; it says where the meshes are.
-    urdf: Path
->>>>>>> h-page
 
     def dynacom(self, inactive: Iterable[str] = ()) -> DynaCoM:
         """A new DynaCoM of this robot, which knows all its contacts.
@@ -186,7 +181,6 @@ def load_robot(name_or_path: str | Path) -> Robot:
             file, the contact and the key, what was expected and what was got.
     """
     file = read_robot_file(_find_robot_file(name_or_path))
-<<<<<<< HEAD
     urdf = _find_urdf(file.urdf, file.path.parent, f"{file.path}: urdf", "a file beside this one")
     return _make_robot(file, urdf)
 
@@ -234,17 +228,6 @@ def parse_payload(text: str) -> Payload:
     if payload is None or not frame:
         raise DynacomError(f"payload must be FRAME:MASS or FRAME:MASS@x,y,z, got '{text}'")
     return payload
-=======
-    urdf = _find_urdf(file)
-    model = _read_urdf(file.path, urdf)
-    contacts = {}
-    for entry in file.contacts:
-        frame = _find_frame(model, entry, file.path)
-        if entry.placement is not None:
-            entry.settings.frame_name = _add_frame(model, frame, entry, file.path)
-        contacts[entry.name] = entry.settings
-    return Robot(file.name, model, contacts, urdf)
->>>>>>> h-page
 
 
 def read_robot_file(path: str | Path) -> RobotFile:
@@ -254,7 +237,13 @@ def read_robot_file(path: str | Path) -> RobotFile:
         DynacomError: as :func:`load_robot`.
     """
     path = Path(path)
-    content = read_yaml(path)
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DynacomError(f"{path}: cannot be read ({error.strerror})") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise DynacomError(f"{path}: must be YAML ({error})") from error
+
     keys = _check_keys(content, _ROBOT_KEYS, str(path))
     contacts = []
     for index, item in enumerate(keys["contacts"]):
@@ -296,15 +285,22 @@ def _boolean(value: Any) -> bool:
     return value
 
 
+def _is_number(value: Any) -> bool:
+    # YAML's true is no number, although Python's is; its integers may be too large for a float.
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max
+
+
 def _number(value: Any) -> float:
-    if not is_number(value):
+    if not _is_number(value):
         raise ValueError("a finite number")
     return float(value)
 
 
 def _numbers(count: int) -> Callable[[Any], np.ndarray]:
     def read(value: Any) -> np.ndarray:
-        if not isinstance(value, list) or len(value) != count or not all(map(is_number, value)):
+        if not isinstance(value, list) or len(value) != count or not all(map(_is_number, value)):
             raise ValueError(f"a list of {count} finite numbers")
         return np.array(value, dtype=float)
 
@@ -313,7 +309,7 @@ def _numbers(count: int) -> Callable[[Any], np.ndarray]:
 
 def _coordinates(value: Any) -> dict[str, float]:
     if not isinstance(value, dict) or not all(
-        isinstance(joint, str) and is_number(number) for joint, number in value.items()
+        isinstance(joint, str) and _is_number(number) for joint, number in value.items()
     ):
         raise ValueError("a mapping of joints' names to finite numbers")
     return {joint: float(number) for joint, number in value.items()}
@@ -482,7 +478,6 @@ def _find_urdf(urdf: str, folder: Path, where: str, place: str) -> Path:
     )
 
 
-<<<<<<< HEAD
 def _make_robot(file: RobotFile, urdf: Path) -> Robot:
     model = _read_urdf(urdf, file.path)
     default = _make_default(model, file)
@@ -498,9 +493,6 @@ def _make_robot(file: RobotFile, urdf: Path) -> Robot:
 
 
 def _read_urdf(urdf: Path, path: Path) -> pin.Model:
-=======
-def _read_urdf(path: Path, urdf: Path) -> pin.Model:
->>>>>>> h-page
     settings = DynaCoMSettings()
     settings.urdf = str(urdf)
     try:
