@@ -60,7 +60,8 @@ void exposeMotion() {
                     "Of velocities and differences of configurations, as a part of the velocities")
       .def_readonly("acceleration", &DerivativeMismatch::acceleration,
                     "Of accelerations and differences of velocities, likewise")
-      .def(PrintVisitor<DerivativeMismatch>(&writeMismatch));
+      .def(PrintVisitor<DerivativeMismatch>(&writeMismatch))
+      .def(CopyVisitor<DerivativeMismatch>());
 
   bp::scope().attr("kMaximalCutoff") = kMaximalCutoff;
   bp::def(

@@ -25,7 +25,7 @@ from dynacom.errors import DynacomError
 from dynacom.yaml_file import is_number, parse_yaml, read_yaml
 
 
-@dataclass
+@dataclass(slots=True)
 class AnalysisOptions:
     """How a motion is analysed."""
 
@@ -98,7 +98,8 @@ class AnalysisOptions:
             changed.validate()
         except ValueError as error:
             raise DynacomError(f"{where}: {error}") from error
-        vars(self).update(vars(changed))
+        for name in _names(self):
+            setattr(self, name, getattr(changed, name))
 
     def to_dict(self) -> dict[str, Any]:
         """The settings, as a settings file would hold them."""

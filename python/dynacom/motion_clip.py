@@ -20,7 +20,7 @@ class Clip:
 
     path: Path
     #: (T,), strictly increasing [s].
-    time: np.ndarray
+    time: np.ndarray = field(repr=False)
     #: Configurations as in Pinocchio, (T, nq); quaternions (x, y, z, w) of norm 1.
     q: np.ndarray = field(repr=False)
     #: Velocities as in Pinocchio, (T, nv); None where the file has none.

@@ -13,6 +13,7 @@ import pytest
 import dynacom
 from dynacom.motion_joints import urdf_order
 from dynacom.robots import Robot
+from helpers import SHARED_DATA
 from motion_files import G1_FILE, TOY_FILE, TOY_URDF
 
 ROOT = Path(__file__).parents[2]
@@ -30,6 +31,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def root() -> Path:
     """The repository."""
     return ROOT
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Motions by third parties, which are not part of the repository."""
+    if not SHARED_DATA.is_dir():
+        pytest.skip("the folder ../shared/data is not there")
+    return SHARED_DATA
 
 
 @pytest.fixture(scope="session")

@@ -2,14 +2,12 @@
 """Every format, and the samples of ../shared/data/SOURCES.md."""
 
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from dynacom import DynacomError, Motion, read_motion
-from helpers import SHARED_DATA
 from motion_files import assert_notes, body_poses, refuses, sway, write_columns, write_csv
 
 
@@ -69,17 +67,10 @@ def test_errors_for_every_way_to_be_wrong_give_no_warnings(tmp_path, toy, recwar
 # The samples.
 
 
-@pytest.fixture(scope="module")
-def data() -> Path:
-    if not SHARED_DATA.is_dir():
-        pytest.skip("the folder ../shared/data is not there")
-    return SHARED_DATA
-
-
-def test_both_files_of_a_clip_agree(data, humanoid):
+def test_both_files_of_a_clip_agree(shared_data, humanoid):
     """Frame by frame, from the first one on; the archive has one frame less."""
-    csv = read_motion(data / "B_HandsUp.csv", humanoid, fps=60)
-    npz = read_motion(data / "B_HandsUp.npz", humanoid)
+    csv = read_motion(shared_data / "B_HandsUp.csv", humanoid, fps=60)
+    npz = read_motion(shared_data / "B_HandsUp.npz", humanoid)
     assert csv.q.shape == (442, 36)
     assert npz.q.shape == (441, 36)
     np.testing.assert_array_equal(csv.time[:441], npz.time)
@@ -93,9 +84,9 @@ def test_both_files_of_a_clip_agree(data, humanoid):
     np.testing.assert_allclose(npz.v[1:-1], 30.0 * np.array(v), rtol=0, atol=1e-3)
 
 
-def test_a_dance(data, humanoid):
+def test_a_dance(shared_data, humanoid):
     """With steps that are as fast as retargeted mocap gets."""
-    path = data / "J_Dance0_StepTouch.csv"
+    path = shared_data / "J_Dance0_StepTouch.csv"
     clip = read_motion(path, humanoid, fps=60)
     assert clip.q.shape == (1949, 36)
     assert clip.time[-1] == pytest.approx(1948 / 60)
@@ -105,9 +96,9 @@ def test_a_dance(data, humanoid):
     refuses(path, humanoid, "right_shoulder_pitch_joint jumps", "78.7 rad/s", fps=120)
 
 
-def test_a_clip_with_a_box(data, humanoid, talos):
+def test_a_clip_with_a_box(shared_data, humanoid, talos):
     """Of a robot whose waist is a centimetre higher."""
-    path = data / "sub3_largebox_003_mj.npz"
+    path = shared_data / "sub3_largebox_003_mj.npz"
     clip = read_motion(path, humanoid)
     assert clip.q.shape == (325, 36)
     assert clip.time[1] == 1 / 50
@@ -118,6 +109,6 @@ def test_a_clip_with_a_box(data, humanoid, talos):
     refuses(path, talos, "must have the joints of talos, got left_hip_pitch_joint, ", "23 more")
 
 
-def test_clips_of_another_robot(data, talos):
-    refuses(data / "B_HandsUp.csv", talos, "32 of the joints of talos, got 36", fps=60)
-    refuses(data / "B_HandsUp.npz", talos, "must have 32 joints, as talos does, got 29")
+def test_clips_of_another_robot(shared_data, talos):
+    refuses(shared_data / "B_HandsUp.csv", talos, "32 of the joints of talos, got 36", fps=60)
+    refuses(shared_data / "B_HandsUp.npz", talos, "must have 32 joints, as talos does, got 29")
