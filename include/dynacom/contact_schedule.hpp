@@ -47,9 +47,9 @@ struct DYNACOM_EXPORT DetectionSettings {
   double height = 0.015, speed = 0.25;
   /// It ceases to where that corner is higher or faster than this; at least as much as the above.
   double release_height = 0.03, release_speed = 0.5;
-  /// At its beginning and end, a contact is cut back to where that corner is no faster than this, or
-  /// than three times its median speed in the contact if that is more: a foot that lands or leaves
-  /// is not at rest yet, or any more, although it is low and slow, ≥ 0 [m/s].
+  /// At its beginning and end, a contact is cut back to where that corner is no faster than this,
+  /// or than three times its median speed in the contact if that is more: a foot that lands or
+  /// leaves is not at rest yet, or any more, although it is low and slow, ≥ 0 [m/s].
   double rest_speed = 0.1;
   /// Contacts, and interruptions, shorter than this are none, ≥ 0 [s].
   double minimal_duration = 0.1;

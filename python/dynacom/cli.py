@@ -258,7 +258,7 @@ def show(
         report.arrays,
         report.summary,
         port=port,
-        ready=lambda url: typer.echo(f"Open {url} (Ctrl-C to stop)"),
+        announce=lambda url: typer.echo(f"Open {url} (Ctrl-C to stop)"),
     )
 
 

@@ -79,7 +79,7 @@ def write_page(
         sensitivity=_sensitivity(summary),
         measured=_measured(summary),
         key=_key(robot),
-        dashed="; dashed: the file's" if summary["measured"] else "",
+        dashed="; dashed: the file's" if any(c["measured"] for c in data["contacts"]) else "",
         scene_class="" if recording else "none",
         data=_json(data),
         # One row a column, the time in double precision.
@@ -128,11 +128,6 @@ def _css(color: tuple[int, int, int]) -> str:
 # ---- What is plotted ----
 
 
-def _weight(robot: Robot, summary: Mapping[str, Any]) -> float:
-    """m g [N]; 1 for robots without, whose forces are zero."""
-    return summary["mass"] * float(np.linalg.norm(robot.model.gravity.linear)) or 1.0
-
-
 def _statuses(arrays: Mapping[str, np.ndarray]) -> list[str]:
     return sorted({str(status) for status in arrays["status"]})
 
@@ -141,7 +136,7 @@ def _columns(
     robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
     """What page.js plots: name -> a value per frame. The first is `time`."""
-    weight = _weight(robot, summary)
+    weight = scene.weight(robot, summary)
     statuses = _statuses(arrays)
     columns = {
         "time": arrays["time"],

@@ -36,7 +36,14 @@ def contact_color(number: int) -> tuple[int, int, int]:
     return CONTACT_COLORS[number % len(CONTACT_COLORS)]
 
 
-def surface_corners(settings: ContactSettings, arrays: Mapping[str, np.ndarray], name: str):
+def weight(robot: Robot, summary: Mapping[str, Any]) -> float:
+    """m g [N]; 1 where that is zero, and forces are, too."""
+    return summary["mass"] * float(np.linalg.norm(robot.model.gravity.linear)) or 1.0
+
+
+def surface_corners(
+    settings: ContactSettings, arrays: Mapping[str, np.ndarray], name: str
+) -> np.ndarray:
     """Where a contact's surface lies: (T, N, 3) in the world [m], N = 4 for soles, 1 for points."""
     position = arrays[f"contact.{name}.position"]
     if not isinstance(settings, Contact6DSettings):
@@ -195,9 +202,7 @@ class Scene:
         self._ground = float(np.median(list(summary["ground"].values()) or [0.0]))
         #: What lengths are measured by: the height of the CoM.
         self._height = max(float(np.nanmedian(arrays["com"][:, 2])) - self._ground, 0.1)
-        self._length_per_newton = self._height / (
-            summary["mass"] * np.linalg.norm(robot.model.gravity.linear)
-        )
+        self._length_per_newton = self._height / weight(robot, summary)
         self._offset = _centre(arrays["time"], arrays["com"][:, :2], self._height)
         self._corners = [
             surface_corners(settings, arrays, name) for name, settings in robot.contacts.items()
@@ -242,17 +247,16 @@ class Scene:
         data = model.createData()
         pin.forwardKinematics(model, data, q)
         joints = np.array([placement.translation for placement in data.oMi[1:]])
-        size = max(self._height, 0.7 * float(np.linalg.norm(np.ptp(joints[:, :2], axis=0))))
+        top = max(float(joints[:, 2].max()) - self._ground, self._height)
+        width = float(np.linalg.norm(np.ptp(joints[:, :2], axis=0)))
+        size = max(0.65 * top, 0.7 * width, self._height)
         x, y, z, w = q[3:7]
         yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)) - 0.7
+        middle = np.array([0.0, 0.0, self._ground + 0.55 * top])
         camera = server.initial_camera
         camera.fov = 0.7
-        camera.look_at = (0.0, 0.0, self._ground + 0.85 * self._height)
-        camera.position = (
-            3.1 * size * np.cos(yaw),
-            3.1 * size * np.sin(yaw),
-            self._ground + 0.85 * self._height + 0.85 * size,
-        )
+        camera.look_at = middle
+        camera.position = middle + size * np.array([3.1 * np.cos(yaw), 3.1 * np.sin(yaw), 0.85])
 
     def _draw_forces(self, robot: Robot) -> Iterator[Callable[[int], None]]:
         for number, name in enumerate(robot.contacts):
