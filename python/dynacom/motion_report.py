@@ -412,7 +412,8 @@ def _derive(clip: Clip, robot: Robot, cutoff: float | None) -> _Derived:
     if cutoff is not None and rate is None and len(clip.time) > 1:
         raise DynacomError(
             f"{clip.path}: times must be evenly spaced to be filtered, got steps from "
-            f"{np.diff(clip.time).min():g} to {np.diff(clip.time).max():g} s"
+            f"{np.diff(clip.time).min():g} to {np.diff(clip.time).max():g} s; without a filter "
+            "(--cutoff 0) they need not be"
         )
     if rate is None:
         cutoff = None
