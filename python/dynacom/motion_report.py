@@ -243,7 +243,7 @@ def analyze(
         motion: a file, see :func:`read_motion`, or what was read from one.
         robot: a robot, or the name or file of one, see :func:`load_robot`.
         fps, quat, trust, clip: as in :func:`read_motion`.
-        schedule: a file, see docs/files.md, or a schedule with T frames.
+        schedule: a file, see docs/verdict.md, or a schedule with T frames.
         options: settings; their defaults by default.
         progress: called now and then with what part of the work is done.
 
