@@ -22,8 +22,9 @@ QUATERNION_NOTED = 1e-5
 #: the robot does not stand, above the second (37°) it does.
 NOT_UPRIGHT, UPRIGHT = 0.6, 0.8
 #: Angles are degrees if so many joints are so far outside their limits [rad] in the median frame,
-#: and none is as far as the third number once they are radians.
+#: or one of them by more than a turn, and none is as far as the last number once they are radians.
 DEGREES_SHARE, DEGREES_EXCESS, RADIANS_EXCESS = 0.4, 1.0, 0.35
+TURN = 2.0 * np.pi
 #: An angle so far outside its limits is noted [rad]. Retargeted motions go a little beyond.
 NOTED_EXCESS = 0.1
 #: A time step, in median ones.
@@ -199,10 +200,10 @@ def check_angles(path: Path, robot: Robot, names: Sequence[str], angles: np.ndar
     frame, column = np.unravel_index(np.argmax(outside), outside.shape)
     name, value = names[limited[column]], angles[frame, column]
     limits = f"{lower[column]:.4g} to {upper[column]:.4g} rad"
-    if (
-        np.mean(np.median(outside, axis=0) > DEGREES_EXCESS) >= DEGREES_SHARE
-        and excess(np.deg2rad(angles)).max() < RADIANS_EXCESS
-    ):
+    usual = np.median(outside, axis=0)
+    if (np.mean(usual > DEGREES_EXCESS) >= DEGREES_SHARE or usual.max() > TURN) and excess(
+        np.deg2rad(angles)
+    ).max() < RADIANS_EXCESS:
         raise DynacomError(
             f"{path}: joints must be in radians, got degrees: {name} ({limits}) is {value:.4g} in "
             f"frame {frame}"

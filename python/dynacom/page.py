@@ -211,7 +211,6 @@ def _head(summary: Mapping[str, Any]) -> str:
         _number(summary["mass"], "kg", 4),
         f"ω = {_number(summary['omega'], 'rad/s')}",
         f"mean vertical force {_number(summary['mean_vertical_force'], 'm g', 4)}",
-        f"derivatives {escape(summary['derivatives'])}",
     ]
     return (
         f"<h1>{escape(summary['clip'])} <span>on {escape(summary['robot'])}</span></h1>"

@@ -699,3 +699,31 @@ def test_progress_on_a_terminal_only(motion_file, tmp_path, run):
     assert "100%" in shown
     assert re.search(r"\d:\d\d:\d\d", shown)  # the time left
     assert b"Verdict" in done.stdout
+
+
+def test_the_page_is_written_unless_it_is_not_wanted(command, motion_file, tmp_path):
+    status, printed, err = command(
+        "analyze", motion_file(), "--robot", "talos", "--out", tmp_path / "out"
+    )
+    assert (status, err) == (0, "")
+    assert f"Wrote {tmp_path / 'out' / 'report.html'}" in printed.splitlines()
+    assert (tmp_path / "out" / "report.html").read_text("utf-8").startswith("<!DOCTYPE html>")
+
+
+# The viewer.
+
+
+def test_show(command, motion_file, monkeypatch):
+    from dynacom import scene
+
+    shown = []
+
+    def show(robot, q, arrays, summary, *, announce, port):
+        shown.append((robot.name, len(q), len(arrays["time"]), summary["frames"], port))
+        announce("http://localhost:1234")
+
+    monkeypatch.setattr(scene, "show", show)
+    status, out, err = command("show", motion_file(), "--robot", "talos", "--port", "1234")
+    assert (status, err) == (0, "")
+    assert shown == [("talos", 40, 40, 40, 1234)]
+    assert "http://localhost:1234" in out
