@@ -20,6 +20,8 @@ namespace {
 constexpr double kGroundPart = 0.05;
 // What standing still is, as a part of what is slow.
 constexpr double kStill = 0.2;
+// What durations may lack through the rounding of times [s].
+constexpr double kRounding = 1e-9;
 // How many times its median speed a contact may move until it is not at rest.
 constexpr double kRest = 3.;
 
@@ -61,7 +63,8 @@ void removeShort(bool value, const Eigen::VectorXd& time, double minimal_duratio
   const Eigen::Array<bool, Eigen::Dynamic, 1> before = values;
   forEachRun(before, [&](Eigen::Index first, Eigen::Index behind) {
     const bool inside = first > 0 && behind < values.size();
-    if (inside && before[first] == value && duration(time, first, behind) < minimal_duration)
+    if (inside && before[first] == value &&
+        duration(time, first, behind) < minimal_duration - kRounding)
       values.segment(first, behind - first).setConstant(!value);
   });
 }
@@ -210,8 +213,8 @@ Eigen::VectorXd estimateGround(const std::vector<ContactMotion>& contacts,
          (contact.height.array() <= top))
             .eval();
     forEachRun(still, [&](Eigen::Index first, Eigen::Index behind) {
-      stands =
-          stands || (still[first] && duration(time, first, behind) >= settings.minimal_duration);
+      stands = stands || (still[first] &&
+                          duration(time, first, behind) >= settings.minimal_duration - kRounding);
     });
     if (*height <= lowest + settings.same_ground || stands) ground[k] = *height;
   }

@@ -181,6 +181,11 @@ BOOST_AUTO_TEST_CASE(what_is_too_short_is_none) {
   };
   BOOST_TEST(detect("....###....") == "....###....");
   BOOST_TEST(detect("....##.....") == "...........");
+  // 0.43 − 0.33 is a little less than 0.1.
+  settings.minimal_duration = 0.1;
+  const std::string late = std::string(33, '.') + std::string(10, '#') + "...";
+  BOOST_TEST(detect(late) == late);
+  settings.minimal_duration = 0.03;
   BOOST_TEST(detect("####...####") == "####...####");
   BOOST_TEST(detect("####..#####") == "###########");
   // Interruptions are mended first.
