@@ -238,6 +238,21 @@ BOOST_AUTO_TEST_CASE(derivatives_of_any_integrator_fit_and_others_do_not) {
     BOOST_TEST(mismatch.velocity < 1e-10);
     BOOST_TEST(mismatch.acceleration > 1.);
   }
+  // An error of the root alone is not hidden by the joints, nor one of its place by its turning.
+  for (const Index row : {0, 1, 2, 3, 4, 5, 6}) {
+    Motion shifted{VectorXd::LinSpaced(frames, 0., 0.58), MatrixXd(model.nq, frames),
+                   MatrixXd::Zero(model.nv, frames), MatrixXd::Zero(model.nv, frames)};
+    shifted.v.bottomRows(model.nv - 6).setConstant(3.);
+    for (Index frame = 0; frame < frames; ++frame)
+      shifted.q.col(frame) =
+          moved(model, restState(model).q, shifted.time[frame] * shifted.v.col(frame));
+    BOOST_TEST(compareDerivatives(model, shifted).velocity < 1e-10);
+    shifted.a.row(row).setConstant(1.);
+    BOOST_TEST(compareDerivatives(model, shifted).acceleration > 0.2);
+    shifted.a.setZero();
+    shifted.v.row(row).array() += row < 6 ? 0.05 : 2.;
+    BOOST_TEST(compareDerivatives(model, shifted).velocity > 0.1);
+  }
   // At rest there is nothing to differ.
   const VectorXd zero = VectorXd::Zero(model.nv);
   const Motion rest{VectorXd::LinSpaced(3, 0., 1.), restState(model).q.replicate(1, 3),

@@ -55,8 +55,10 @@ DYNACOM_EXPORT Motion differentiate(const pinocchio::Model& model, const Eigen::
 /// How well derivatives fit what they are the derivatives of.
 struct DerivativeMismatch {
   /// ‖(q[k+1] ⊖ q[k])/Δt − v‖ as a part of ‖v‖, and ‖(v[k+1] − v[k])/Δt − a‖ of ‖a‖, both root mean
-  /// squares over the steps. v and a are those at the step's beginning, at its end, or their mean,
-  /// whichever fits best, because integrators differ.
+  /// squares over the steps, the worst of three: the free-flyer's linear and angular part, and the
+  /// joints. v and a are those at the step's beginning, at its end, or their mean, whichever fits
+  /// best, because integrators differ. What hardly moves is a part of 0.05 m/s or rad/s, and of
+  /// 0.5 m/s² or rad/s², at least.
   double velocity, acceleration;
 };
 

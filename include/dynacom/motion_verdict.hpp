@@ -67,9 +67,8 @@ struct DYNACOM_EXPORT VerdictSettings {
 
   const FaultLimit& operator[](MotionFault fault) const;
   FaultLimit& operator[](MotionFault fault);
-  /// @throws std::invalid_argument naming the first that is out of its range: limits and
-  /// near_ground
-  ///         must be finite and ≥ 0, shares from 0 to 1
+  /// @throws std::invalid_argument naming the first that is out of its range: limits must be finite
+  ///         and ≥ 0, and so must near_ground; shares are from 0 to 1
   void validate() const;
   std::string to_string() const;
   bool operator==(const VerdictSettings& other) const;

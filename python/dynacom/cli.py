@@ -5,6 +5,7 @@ Exit status 0 when what was asked for was done, whatever came out; 1 where ``--c
 a motion is feasible, and it is not; 2 for bad input, which one line on stderr explains.
 """
 
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,6 +30,8 @@ app = typer.Typer(
 
 def main() -> None:
     """Runs the command with the arguments of the process, and exits."""
+    # As Ctrl-C, so that nothing half-written stays behind.
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
     try:
         app(prog_name="dynacom")
     except (DynacomError, ValueError, KeyError, OSError) as error:
@@ -180,7 +183,8 @@ def analyze(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Folder for the results, made if it is not there; CLIP-analysis by default.",
+            help="Folder for the results, made if it is not there; CLIP-analysis, where you are, "
+            "by default.",
         ),
     ] = None,
     csv: Annotated[bool, typer.Option("--csv", help="Write frames.csv, too.")] = False,

@@ -37,6 +37,9 @@ from dynacom.schedule_file import read_schedule, write_schedule
 if TYPE_CHECKING:
     import pandas
 
+# All that may be written of a report.
+_FILES = ("frames.csv", "frames.parquet", "report.html", "schedule.yaml", "summary.json")
+
 _XYZ = ("_x", "_y", "_z")
 _XY = ("_x", "_y")
 _WRENCH = tuple(f"_{part}{axis}" for part in ("force", "torque") for axis in _XYZ)
@@ -85,6 +88,9 @@ _ACCELERATION_MISMATCH = 0.2
 # How far a frame may be from where an even frame rate puts it, in frames, to be taken for there:
 # times are often rounded to milliseconds.
 _EVEN = 0.1
+
+# From which height on a ground is worth a question: most files have theirs at zero [m].
+_FAR_FROM_ZERO = 0.1
 
 _FAULTS = {
     "residual_force": ("m g", "the contacts cannot give the force"),
@@ -156,7 +162,8 @@ class MotionReport:
     def save(self, folder: str | Path, *, csv: bool = False, page: bool = True) -> list[Path]:
         """Writes frames.parquet, summary.json, schedule.yaml and report.html: all of them or none.
 
-        Files of these names that are there already are replaced, others stay.
+        Files of these names, and frames.csv, that are there already are replaced, or taken away if
+        they are not wanted now; others stay.
 
         Args:
             folder: made if it is not there.
@@ -172,7 +179,7 @@ class MotionReport:
         """
         folder = Path(folder)
         try:
-            with results_folder(folder) as temporary:
+            with results_folder(folder, _FILES) as temporary:
                 self._write_tables(temporary, csv)
                 text = json.dumps(self.summary, indent=2, ensure_ascii=False, allow_nan=False)
                 (temporary / "summary.json").write_text(text + "\n", encoding="utf-8")
@@ -327,8 +334,13 @@ def _analyze(
         sensitivity.sort(key=lambda entry: entry["cutoff"])
 
     arrays = _collect_arrays(clip, analysis, contacts, ground)
-    unexplained = _unexplained(clip, analysis)
-    notes = [*clip.notes, derived.text, schedule_text, _ground_text(robot, ground)]
+    unexplained = _unexplained(clip, analysis, verdict)
+    notes = [
+        *clip.notes,
+        derived.text,
+        schedule_text,
+        _ground_text(robot, ground, options.detection.same_ground),
+    ]
     if unexplained["share"] > 0.0:
         notes.append(_unexplained_text(unexplained))
     summary = {
@@ -461,11 +473,24 @@ def _find_schedule(
     return found, "Contacts are found from height and speed."
 
 
-def _ground_text(robot: Robot, ground: np.ndarray) -> str:
+def _ground_text(robot: Robot, ground: np.ndarray, same_ground: float) -> str:
     heights = ", ".join(
         f"{name} {height:.3f} m" for name, height in zip(robot.contacts, ground, strict=True)
     )
-    return f"Height of the ground: {heights}."
+    text = f"Height of the ground: {heights}."
+    lowest = ground.min()
+    if steps := [
+        f"{name} ({height - lowest:.2f} m)"
+        for name, height in zip(robot.contacts, ground, strict=True)
+        if height - lowest > same_ground
+    ]:
+        text += (
+            f" So these are taken to stand on a step, as they are still up there: {', '.join(steps)}."
+            " If they are in the air, --ground-height says where the ground is."
+        )
+    if np.abs(ground).min() > _FAR_FROM_ZERO:
+        text += " None is near the height 0: is it this robot's motion?"
+    return text
 
 
 # Results.
@@ -483,28 +508,35 @@ def _momentum_change(analysis: MotionAnalysis, mass: float) -> float:
     return float(mass * (velocity[-1] - velocity[0]) / duration) if duration > 0.0 else 0.0
 
 
-def _unexplained(clip: Clip, analysis: MotionAnalysis) -> dict[str, Any]:
-    """What the contacts cannot give, over all frames: noise has no mean, but a load has.
+def _unexplained(clip: Clip, analysis: MotionAnalysis, verdict: MotionVerdict) -> dict[str, Any]:
+    """What the contacts cannot give.
 
-    The mean force [N] and moment about the CoM [N m] are in the heading's axes: x to where the root
-    looks, z up.
+    The mean force [N] and moment about the CoM [N m] are over the frames in which no contact is
+    missing, in the heading's axes: x to where the root looks, z up.
     """
+    supported = np.ones(len(clip.time), dtype=bool)
+    for code in ("contact_missing", "flight_with_support_needed"):
+        supported &= verdict.findings[code].measured == 0.0
     x, y, z, w = clip.q[:, 3:7].T
     yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     cos, sin = np.cos(yaw), np.sin(yaw)
     forward = np.stack([cos, sin, 0.0 * yaw], axis=1)
     left = np.stack([-sin, cos, 0.0 * yaw], axis=1)
     residual = analysis.residual.reshape(-1, 2, 3)
-    means = [
+    force, torque = (
         [
-            float((part * forward).sum(axis=1).mean()),
-            float((part * left).sum(axis=1).mean()),
-            float(part[:, 2].mean()),
+            _mean((part * forward).sum(axis=1)[supported]),
+            _mean((part * left).sum(axis=1)[supported]),
+            _mean(part[supported, 2]),
         ]
         for part in (residual[:, 0], residual[:, 1])
-    ]
+    )
     solved = [status.name == "Solved" for status in analysis.status]
-    return {"share": 1.0 - float(np.mean(solved)), "force": means[0], "torque": means[1]}
+    return {"share": 1.0 - float(np.mean(solved)), "force": force, "torque": torque}
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if len(values) else 0.0
 
 
 def _unexplained_text(unexplained: dict[str, Any]) -> str:
@@ -513,8 +545,8 @@ def _unexplained_text(unexplained: dict[str, Any]) -> str:
     )
     return (
         f"In {unexplained['share']:.1%} of the frames the contacts cannot give what the motion "
-        f"takes. Over all frames, ({force}) N and ({torque}) N m are missing on average, forward, "
-        "left and up: noise has no mean, but a load that the robot carries has."
+        f"takes. Where no contact is missing, ({force}) N and ({torque}) N m are missing on "
+        "average, forward, left and up: a load that nobody has told of may be the reason."
     )
 
 

@@ -5,17 +5,20 @@ import errno
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
 @contextmanager
-def results_folder(path: Path) -> Iterator[Path]:
+def results_folder(path: Path, own: Iterable[str] = ()) -> Iterator[Path]:
     """A temporary folder, whose files appear in path when all has gone well.
 
     Whatever goes wrong, an interruption too, path is left as it was. Files of the same names are
     replaced, others stay.
+
+    Args:
+        own: names of files that are taken away where there is no new one: of another time's results.
 
     Raises:
         OSError: path is not a folder, or cannot be written to, or has a folder where a file shall
@@ -33,20 +36,21 @@ def results_folder(path: Path) -> Iterator[Path]:
         results.mkdir()
         replaced.mkdir()
         yield results
-        names = sorted(file.name for file in results.iterdir())
+        names = sorted({file.name for file in results.iterdir()} | set(own))
         for name in names:
             if (path / name).is_dir():
                 raise IsADirectoryError(errno.EISDIR, f"{name} is a folder")
         for name in names:
             if (path / name).exists():
                 os.replace(path / name, replaced / name)
-            os.replace(results / name, path / name)
+            if (results / name).exists():
+                os.replace(results / name, path / name)
         finished = True
     finally:
         if not finished:
             for name in names:
                 if not (results / name).exists():
-                    (path / name).unlink()
+                    (path / name).unlink(missing_ok=True)
                 if (replaced / name).exists():
                     os.replace(replaced / name, path / name)
         shutil.rmtree(temporary, ignore_errors=True)

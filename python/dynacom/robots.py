@@ -38,7 +38,6 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
-import yaml
 
 from dynacom.dynacom_pywrap import (
     Contact6D,
@@ -49,6 +48,7 @@ from dynacom.dynacom_pywrap import (
     DynaCoMSettings,
 )
 from dynacom.errors import DynacomError
+from dynacom.yaml_file import is_number, read_yaml
 
 ContactSettings: TypeAlias = ContactPointSettings | Contact6DSettings
 
@@ -237,13 +237,7 @@ def read_robot_file(path: str | Path) -> RobotFile:
         DynacomError: as :func:`load_robot`.
     """
     path = Path(path)
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DynacomError(f"{path}: cannot be read ({error.strerror})") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise DynacomError(f"{path}: must be YAML ({error})") from error
-
+    content = read_yaml(path)
     keys = _check_keys(content, _ROBOT_KEYS, str(path))
     contacts = []
     for index, item in enumerate(keys["contacts"]):
@@ -285,22 +279,15 @@ def _boolean(value: Any) -> bool:
     return value
 
 
-def _is_number(value: Any) -> bool:
-    # YAML's true is no number, although Python's is; its integers may be too large for a float.
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return abs(value) <= sys.float_info.max
-
-
 def _number(value: Any) -> float:
-    if not _is_number(value):
+    if not is_number(value):
         raise ValueError("a finite number")
     return float(value)
 
 
 def _numbers(count: int) -> Callable[[Any], np.ndarray]:
     def read(value: Any) -> np.ndarray:
-        if not isinstance(value, list) or len(value) != count or not all(map(_is_number, value)):
+        if not isinstance(value, list) or len(value) != count or not all(map(is_number, value)):
             raise ValueError(f"a list of {count} finite numbers")
         return np.array(value, dtype=float)
 
@@ -309,7 +296,7 @@ def _numbers(count: int) -> Callable[[Any], np.ndarray]:
 
 def _coordinates(value: Any) -> dict[str, float]:
     if not isinstance(value, dict) or not all(
-        isinstance(joint, str) and _is_number(number) for joint, number in value.items()
+        isinstance(joint, str) and is_number(number) for joint, number in value.items()
     ):
         raise ValueError("a mapping of joints' names to finite numbers")
     return {joint: float(number) for joint, number in value.items()}
