@@ -485,7 +485,7 @@ def _ground_text(robot: Robot, ground: np.ndarray, same_ground: float) -> str:
         if height - lowest > same_ground
     ]:
         text += (
-            f" So these are taken to stand on a step, as they are still up there: {', '.join(steps)}."
+            f" {', '.join(steps)} higher: still there, and so taken to stand on steps."
             " If they are in the air, --ground-height says where the ground is."
         )
     if np.abs(ground).min() > _FAR_FROM_ZERO:

@@ -18,7 +18,7 @@ def results_folder(path: Path, own: Iterable[str] = ()) -> Iterator[Path]:
     replaced, others stay.
 
     Args:
-        own: names of files that are taken away where there is no new one: of another time's results.
+        own: names of files of an earlier time that are taken away where there is no new one.
 
     Raises:
         OSError: path is not a folder, or cannot be written to, or has a folder where a file shall
