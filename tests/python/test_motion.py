@@ -298,18 +298,22 @@ def test_times_that_are_none(model):
 def mismatch(model: pin.Model, motion: Motion) -> tuple[float, float]:
     """As motion.hpp defines it, once more."""
 
-    def ratio(slopes: np.ndarray, values: np.ndarray) -> float:
-        before, after = values[:-1], values[1:]
-        errors = [((slopes - x) ** 2).sum(axis=1) for x in (before, after, 0.5 * (before + after))]
-        size = 0.5 * ((before**2).sum(axis=1) + (after**2).sum(axis=1))
-        return np.sqrt(np.min(errors, axis=0).sum() / size.sum())
+    def ratio(slopes: np.ndarray, values: np.ndarray, least: float) -> float:
+        ratios = []
+        for part in (slice(0, 3), slice(3, 6), slice(6, None)):  # place, orientation, joints
+            before, after = values[:-1, part], values[1:, part]
+            fits = (before, after, 0.5 * (before + after))
+            errors = [((slopes[:, part] - x) ** 2).sum(axis=1) for x in fits]
+            size = 0.5 * ((before**2).sum(axis=1) + (after**2).sum(axis=1)).mean()
+            ratios.append(np.sqrt(np.min(errors, axis=0).mean()) / max(np.sqrt(size), least))
+        return max(ratios)
 
     steps = np.diff(motion.time)[:, None]
     pairs = zip(motion.q[:-1], motion.q[1:], strict=True)
     differences = np.array([pin.difference(model, *pair) for pair in pairs])
     return (
-        ratio(differences / steps, motion.v),
-        ratio(np.diff(motion.v, axis=0) / steps, motion.a),
+        ratio(differences / steps, motion.v, 0.05),
+        ratio(np.diff(motion.v, axis=0) / steps, motion.a, 0.5),
     )
 
 
