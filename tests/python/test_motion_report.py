@@ -575,8 +575,8 @@ def test_times_that_are_rounded_are_even(talos, bare, rate, digits):
 
 
 def test_the_schedule_found(report, found):
-    """With derivatives from filtered positions: take-offs are gradual, and one that follows a stance
-    of a quarter of a second is found late, for its speed is a part of that stance's."""
+    """With derivatives from filtered positions: take-offs are gradual, and one that follows a
+    stance of a quarter of a second is found late, for its speed is a part of that stance's."""
     assert "Contacts are active as the file says." in report.summary["notes"]
     assert "Contacts are found from height and speed." in found.summary["notes"]
     assert found.schedule.names == report.schedule.names
