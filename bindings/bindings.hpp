@@ -24,6 +24,9 @@ void exposeContact6D();
 void exposeWrenchDistribution();
 void exposeDynaCoM();
 void exposeMotion();
+void exposeContactSchedule();
+void exposeMotionAnalysis();
+void exposeMotionVerdict();
 
 /// The numbers of an array, a list or a tuple; everything else is a TypeError. Not a converter of
 /// Boost.Python's: that would be one for Pinocchio's functions too, and choose among their
@@ -85,6 +88,47 @@ bp::object callForArray(const Class& self) {
 }
 #define DYNACOM_MATRIX(Class, method) \
   &callForArray<Class, decltype(std::declval<const Class&>().method()), &Class::method>
+
+/// Reads a matrix member, which has a column per frame, with a row per frame, as is usual in
+/// Python: the same memory in numpy's order.
+template <auto member>
+struct Rows;
+template <class Class, class Matrix, Matrix Class::*member>
+struct Rows<member> {
+  static bp::object get(const Class& self) {
+    using Transposed = Eigen::Matrix<typename Matrix::Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+    return toArray(Transposed((self.*member).transpose()));
+  }
+};
+
+/// A list as Python's.
+template <class Element>
+bp::list toList(const std::vector<Element>& elements) {
+  bp::list list;
+  for (const Element& element : elements) list.append(element);
+  return list;
+}
+
+/// The elements of any iterable.
+template <class Element>
+std::vector<Element> toVectorOf(const bp::object& elements) {
+  std::vector<Element> vector;
+  const bp::list list(elements);  // refuses what is no iterable
+  for (bp::ssize_t i = 0; i < bp::len(list); ++i) vector.push_back(bp::extract<Element>(list[i]));
+  return vector;
+}
+
+/// Runs without Python's lock, which whoever calls Python meanwhile has to take.
+class WithoutLock {
+ public:
+  WithoutLock() : state_(PyEval_SaveThread()) {}
+  ~WithoutLock() { PyEval_RestoreThread(state_); }
+  WithoutLock(const WithoutLock&) = delete;
+  WithoutLock& operator=(const WithoutLock&) = delete;
+
+ private:
+  PyThreadState* state_;
+};
 
 /// For methods that return a reference: Python gets a copy.
 using Copied = bp::return_value_policy<bp::copy_const_reference>;

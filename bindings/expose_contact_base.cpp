@@ -50,6 +50,13 @@ void exposeContactBase() {
       .def("getSurfacePose", &ContactBase::getSurfacePose, bp::arg("self"),
            "Placement of the surface in the world: getPose(), unless world_aligned or radius say\n"
            "otherwise.")
+      .def(
+          "getCorners",
+          +[](const ContactBase& self) { return toArray(self.getCorners().transpose()); },
+          bp::arg("self"),
+          "Corners of the surface, in its plane and in order around it, (corners, 2) [m]: of "
+          "points\n"
+          "the origin.")
       .def("uni_rows", &ContactBase::uni_rows, bp::arg("self"), "Rows of uni_A.")
       .def("fri_rows", &ContactBase::fri_rows, bp::arg("self"), "Rows of fri_A.")
       .def("cols", &ContactBase::cols, bp::arg("self"), "Components of lambda: 3 or 6.")

@@ -58,7 +58,9 @@ void exposeDynaCoM() {
 
   bp::class_<Settings>("DynaCoMSettings", "What describes a DynaCoM.", bp::init<>(bp::arg("self")))
       .def_readwrite("urdf", &Settings::urdf,
-                     "Path of a URDF file, or the XML itself. The root joint will be a free-flyer.")
+                     "Path of a URDF file, or the XML itself. The root joint will be a free-flyer: "
+                     "the file's own, where a massless root link holds all others by a floating "
+                     "joint, whose origin is left out.")
       .add_property("gravity", getter(&Settings::gravity), setter(&Settings::gravity, "gravity"),
                     "Along -z or zero, (3,) [m/s²]; (0, 0, -9.81) by default.")
       .def(SettingsVisitor<Settings>());

@@ -36,4 +36,7 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeWrenchDistribution();
   exposeDynaCoM();
   exposeMotion();
+  exposeContactSchedule();
+  exposeMotionAnalysis();
+  exposeMotionVerdict();
 }

@@ -65,4 +65,10 @@ Eigen::Vector2d computeVRP(const CentroidalState& state, double omega) {
   return vrp.allFinite() ? vrp : Eigen::Vector2d::Constant(internal::kNaN);
 }
 
+Eigen::Vector2d computeDCM(const CentroidalState& state, double omega) {
+  internal::requireOmega(omega);
+  const Eigen::Vector2d dcm = state.com.head<2>() + state.vcom.head<2>() / omega;  // (20)
+  return dcm.allFinite() ? dcm : Eigen::Vector2d::Constant(internal::kNaN);
+}
+
 }  // namespace dynacom

@@ -48,6 +48,14 @@ void Contact6D::initialize(const Contact6DSettings& settings) {
 
 std::shared_ptr<ContactBase> Contact6D::clone() const { return std::make_shared<Contact6D>(*this); }
 
+Eigen::Matrix2Xd Contact6D::getCorners() const {
+  const double dx = settings_.half_length, dy = settings_.half_width;
+  Eigen::Matrix2Xd corners(2, 4);
+  corners << dx, -dx, -dx, dx,  //
+      dy, dy, -dy, -dy;
+  return corners;
+}
+
 double Contact6D::getFrictionUsage() const {
   if (cols() == 0) return ContactBase::getFrictionUsage();
   return getUsage(appliedForce().head<2>().lpNorm<Eigen::Infinity>(), settings_.mu);

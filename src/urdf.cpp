@@ -62,6 +62,14 @@ bool isXml(const std::string& urdf) {
   return first != std::string::npos && urdf[first] == '<';
 }
 
+// Whether the root joint moves nothing but a link without mass, which holds the robot by a floating
+// joint of the file's own.
+bool hasFloatingBase(const pinocchio::Model& model) {
+  const auto& children = model.children[1];
+  return model.inertias[1].mass() == 0. && children.size() == 1 &&
+         model.joints[children[0]].shortname() == pinocchio::JointModelFreeFlyer::classname();
+}
+
 }  // namespace
 
 pinocchio::Model readUrdf(const std::string& urdf) {
@@ -74,6 +82,12 @@ pinocchio::Model readUrdf(const std::string& urdf) {
   const ParserErrors errors;
   try {
     pinocchio::urdf::buildModelFromXML(xml, pinocchio::JointModelFreeFlyer(), model);
+    if (hasFloatingBase(model)) {
+      model = pinocchio::Model();
+      pinocchio::urdf::buildModelFromXML(xml, model);
+      // Where a simulator would put the robot first: q shall be the base's pose in the world.
+      model.jointPlacements[1].setIdentity();
+    }
   } catch (const std::exception& error) {
     throwInvalid("DynaCoMSettings.urdf: ", source,
                  " is not a robot's URDF: ", errors.text().empty() ? error.what() : errors.text());

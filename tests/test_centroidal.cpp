@@ -305,9 +305,24 @@ BOOST_AUTO_TEST_CASE(virtual_repellent_point_by_hand) {
   BOOST_TEST(close(computeVRP(someState(), 0.5), Vector2d(1. - 0.5 * 4., 2. + 1. * 4.)));
 }
 
+BOOST_AUTO_TEST_CASE(divergent_component_of_motion_by_hand) {
+  // ξ = c + ċ / ω, of which the derivative is ω (ξ − v).
+  const CentroidalState state = someState();
+  const Vector2d c = state.com.head<2>(), velocity = state.vcom.head<2>();
+  BOOST_TEST(close(computeDCM(state, 2.), c + velocity / 2.));
+  const Vector2d derivative = velocity + state.acom.head<2>() / 2.;
+  BOOST_TEST(close(derivative, 2. * (computeDCM(state, 2.) - computeVRP(state, 2.))));
+  CentroidalState far = state;
+  far.vcom.setConstant(1e300);
+  BOOST_TEST(allNaN(computeDCM(far, 1e-100)));
+}
+
 BOOST_AUTO_TEST_CASE(virtual_repellent_point_wants_a_positive_omega) {
   for (const auto& [omega, text] :
-       {std::pair<double, const char*>(0., "0"), {-0.25, "-0.25"}, {kNaN, "nan"}})
+       {std::pair<double, const char*>(0., "0"), {-0.25, "-0.25"}, {kNaN, "nan"}}) {
     BOOST_TEST(throws<std::invalid_argument>([&, w = omega] { computeVRP(someState(), w); },
                                              {"omega", text}));
+    BOOST_TEST(throws<std::invalid_argument>([&, w = omega] { computeDCM(someState(), w); },
+                                             {"omega", text}));
+  }
 }

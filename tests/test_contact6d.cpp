@@ -128,6 +128,29 @@ BOOST_AUTO_TEST_CASE(the_surface_is_the_frame) {
   BOOST_TEST((contact.getSurfacePose() == pose));
 }
 
+BOOST_AUTO_TEST_CASE(corners_are_where_the_pressure_may_be_at_most) {
+  // With all of its force in a corner, a contact is at its limits there, and beyond them further
+  // out.
+  Random random(9);
+  for (int i = 0; i < 20; ++i) {
+    const Contact6D contact(randomSettings(random));
+    const Eigen::Matrix2Xd corners = contact.getCorners();
+    BOOST_REQUIRE(corners.cols() == 4);
+    double area = 0.;
+    for (Index k = 0; k < 4; ++k) {
+      const Vector2d corner = corners.col(k), next = corners.col((k + 1) % 4);
+      Vector6 force;
+      force << 0., 0., 1., corner.y(), -corner.x(), 0.;
+      const VectorXd slack = contact.uni_A() * force;
+      BOOST_TEST((slack.array() <= 1e-15).all());
+      BOOST_TEST((slack.array().abs() <= 1e-15).count() == 2);
+      area += 0.5 * (corner.x() * next.y() - corner.y() * next.x());
+    }
+    const auto& settings = contact.getSettings();
+    BOOST_TEST(close(area, 4. * settings.half_length * settings.half_width));
+  }
+}
+
 BOOST_AUTO_TEST_CASE(inequalities_hold_the_pressure_inside_the_rectangle) {
   // U λ ≤ 0 means: it pushes, and the centre of pressure is in the rectangle. Signs and the order
   // of length and width are told apart by putting the pressure beyond each edge in turn.

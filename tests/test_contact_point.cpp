@@ -137,6 +137,12 @@ BOOST_AUTO_TEST_CASE(a_ball_touches_below_its_centre_along_the_normal) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(a_point_is_its_own_corner) {
+  Random random(8);
+  const ContactPoint contact(randomSettings(random));
+  BOOST_TEST(close(contact.getCorners(), MatrixXd::Zero(2, 1), 0.));
+}
+
 BOOST_AUTO_TEST_CASE(friction_usage_is_the_larger_tangential_force_over_what_is_allowed) {
   ContactPointSettings settings;
   settings.mu = 0.5;

@@ -2696,6 +2696,18 @@ DynaCoMSettings settingsOf(const std::string& urdf) {
   return settings;
 }
 
+/// The robot of kUrdf with links and joints added.
+std::string hopperWith(const std::string& parts) {
+  std::string urdf = kUrdf;
+  return urdf.insert(urdf.find("<link"), parts);
+}
+
+std::string joint(const std::string& name, const std::string& type, const std::string& parent,
+                  const std::string& child, const std::string& origin = "") {
+  return "<joint name=\"" + name + "\" type=\"" + type + "\"><parent link=\"" + parent +
+         "\"/><child link=\"" + child + "\"/>" + origin + "</joint>";
+}
+
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(a_urdf_is_a_path_or_the_text_itself) {
@@ -2743,6 +2755,64 @@ BOOST_AUTO_TEST_CASE(a_path_may_have_spaces_and_odd_letters) {
 BOOST_AUTO_TEST_CASE(a_text_may_begin_with_white_space) {
   const DynaCoM dynacom(settingsOf("\n  \t" + kUrdf.substr(kUrdf.find("<robot"))));
   BOOST_TEST(close(dynacom.getMass(), 15.));
+}
+
+BOOST_AUTO_TEST_CASE(a_floating_joint_at_the_root_is_the_free_flyer) {
+  const DynaCoM plain(settingsOf(kUrdf));
+  const std::string origin = "<origin xyz=\"1 2 3\" rpy=\"0.1 0.2 0.3\"/>";
+  for (const std::string& root :
+       {"<link name=\"world\"/>" + joint("base", "floating", "world", "trunk"),
+        "<link name=\"world\"/>" + joint("base", "floating", "world", "trunk", origin),
+        "<link name=\"world\"/><link name=\"map\"/>" +
+            joint("fix", "fixed", "world", "map", origin) +
+            joint("base", "floating", "map", "trunk", origin)}) {
+    BOOST_TEST_CONTEXT(root) {
+      DynaCoM dynacom;
+      BOOST_TEST(printedBy([&] { dynacom.initialize(settingsOf(hopperWith(root))); }) == "");
+      const auto& model = dynacom.getModel();
+      BOOST_TEST(model.nq == 7 + 1);
+      BOOST_TEST(model.nv == 6 + 1);
+      BOOST_TEST(model.names[1] == "base");
+      BOOST_TEST(close(dynacom.getMass(), 15.));
+      // Its coordinates are the pose of the trunk in the world, as those of the one that is added.
+      Random random(71);
+      const State x = randomState(model, random);
+      DynaCoM reference(plain);
+      for (DynaCoM* one : {&dynacom, &reference}) {
+        one->addContact(makeSole("sole"), "sole");
+        compute(*one, x, Vector6::Zero(), false);
+      }
+      BOOST_TEST(close(framePlacement(model, x.q, "trunk").translation(), x.q.head<3>()));
+      BOOST_TEST(close(dynacom.getCoM(), reference.getCoM()));
+      BOOST_TEST(close(groundWrench(dynacom), groundWrench(reference)));
+      BOOST_TEST(close(dynacom.getContact("sole")->getPose().toHomogeneousMatrix(),
+                       reference.getContact("sole")->getPose().toHomogeneousMatrix()));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(other_floating_joints_are_joints) {
+  const std::string mass =
+      "<inertial><mass value=\"1\"/>"
+      "<inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial>";
+  const std::string world = "<link name=\"world\"/>",
+                    ball = "<link name=\"ball\">" + mass + "</link>";
+  const std::string floating = joint("base", "floating", "world", "trunk");
+  const auto nq = [](const std::string& part) {
+    return DynaCoM(settingsOf(hopperWith(part))).getModel().nq;
+  };
+  // Below the base.
+  BOOST_TEST(nq(ball + joint("throw", "floating", "trunk", "ball")) == 7 + 1 + 7);
+  BOOST_TEST(nq(world + floating + ball + joint("throw", "floating", "trunk", "ball")) ==
+             7 + 1 + 7);
+  // The root link is a body itself, or holds another.
+  BOOST_TEST(nq("<link name=\"world\">" + mass + "</link>" + floating) == 7 + 7 + 1);
+  BOOST_TEST(nq(world + floating + ball + joint("fix", "fixed", "world", "ball")) == 7 + 7 + 1);
+  BOOST_TEST(nq(world + floating + ball + joint("throw", "floating", "world", "ball")) ==
+             7 + 7 + 1 + 7);
+  // A massless root link with another joint.
+  BOOST_TEST(nq(world + joint("fix", "fixed", "world", "trunk")) == 7 + 1);
+  BOOST_TEST(nq(world + joint("rail", "continuous", "world", "trunk")) == 7 + 2 + 1);
 }
 
 BOOST_AUTO_TEST_CASE(gravity_of_the_settings_is_that_of_the_model) {

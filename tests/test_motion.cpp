@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #define BOOST_TEST_MODULE motion
-#include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <map>
-#include <mutex>
 
-#include "dynacom/contact6d.hpp"
-#include "dynacom/contact_point.hpp"
 #include "dynacom/motion.hpp"
 #include "random_robot.hpp"
 
@@ -17,325 +11,252 @@ using namespace dynacom_tests;
 
 namespace {
 
-const double kNaN = std::numeric_limits<double>::quiet_NaN();
+const double kPi = std::acos(-1.);
 
-/// A robot on two soles and a point, and a motion near its rest, in which some of them take part.
-struct Walk {
-  explicit Walk(unsigned seed, Index frames = 40)
-      : random(seed), model(standingRobot(random, stance(3))), robot(model) {
-    Contact6DSettings sole;
-    sole.mu = 0.7;
-    sole.gu = 0.1;
-    sole.half_length = 0.5;
-    sole.half_width = 0.2;
-    for (const char* frame : {"sole0", "sole1"}) {
-      sole.frame_name = frame;
-      robot.addContact(std::make_shared<Contact6D>(sole), std::string("foot on ") + frame);
-    }
-    ContactPointSettings point;
-    point.mu = 0.7;
-    point.frame_name = "sole2";
-    robot.addContact(std::make_shared<ContactPoint>(point), "hand", false);
+/// A motion along what a function gives of time, in the tangent space at q.
+template <class Step>
+MatrixXd along(const pinocchio::Model& model, const VectorXd& q, const VectorXd& time, Step step) {
+  MatrixXd path(model.nq, time.size());
+  for (Index frame = 0; frame < time.size(); ++frame)
+    path.col(frame) = moved(model, q, step(time[frame]));
+  return path;
+}
 
-    motion.time = VectorXd::LinSpaced(frames, 0., 1.);
-    motion.q.resize(model.nq, frames);
-    motion.v.resize(model.nv, frames);
-    motion.a.resize(model.nv, frames);
-    for (Index frame = 0; frame < frames; ++frame) {
-      const State x = randomState(model, random, 0.02);
-      motion.q.col(frame) = x.q;
-      motion.v.col(frame) = x.v;
-      motion.a.col(frame) = x.a;
-    }
-    // Not in the robot's order.
-    schedule.names = {"hand", "foot on sole1", "foot on sole0"};
-    schedule.active.resize(3, frames);
-    for (Index frame = 0; frame < frames; ++frame)
-      schedule.active.col(frame) << random.coin(), frame % 10 != 3, frame % 7 != 0;
-    schedule.active.col(5).setConstant(false);
-  }
+/// A free-flying body with a joint that turns.
+pinocchio::Model spinner() {
+  pinocchio::Model model = singleBody(1., {});
+  model.addJoint(1, pinocchio::JointModelRZ(), SE3::Identity(), "joint");
+  return model;
+}
 
-  Random random;
-  pinocchio::Model model;
-  DynaCoM robot;
-  Motion motion;
-  ContactSchedule schedule;
-};
-
-/// Whether two numbers, or all of two vectors, are the same, or NaN both.
-boost::test_tools::predicate_result sameOrNaN(const VectorXd& actual, const VectorXd& expected,
-                                              double tolerance = 1e-12) {
-  if (allNaN(expected)) return allNaN(actual);
-  return close(actual, expected, tolerance);
+/// Of a free-flyer's configuration.
+SE3 placementOf(const Eigen::Ref<const VectorXd>& q) {
+  return SE3(Eigen::Quaterniond(q[6], q[3], q[4], q[5]).toRotationMatrix(), q.head<3>());
 }
 
 }  // namespace
 
-BOOST_AUTO_TEST_CASE(every_frame_is_what_a_dynacom_says) {
-  std::map<DistributionStatus, int> count;
-  for (const bool flat : {true, false}) {
-    Walk walk(1);
-    // Faster than friction allows.
-    walk.motion.a.col(11).head<3>() << 30., 0., 0.;
-    walk.robot.setGroundHeight(-0.1);
-    AnalysisSettings settings;
-    settings.flat_horizontal_ground = flat;
-    settings.omega = 3.5;
-    const auto result = analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
-    BOOST_TEST(result.omega == 3.5);
-    BOOST_TEST(close(result.time, walk.motion.time, 0.));
-    BOOST_REQUIRE(result.contacts.size() == 3u);
-    BOOST_REQUIRE(result.status.size() == static_cast<std::size_t>(walk.motion.frames()));
-
-    for (Index frame = 0; frame < walk.motion.frames(); ++frame) {
-      BOOST_TEST_CONTEXT("frame " << frame) {
-        // A DynaCoM that knows no other frame.
-        DynaCoM expected(walk.robot);
-        for (const auto& name : expected.getKnownContacts()) expected.deactivateContact(name);
-        for (Index k = 0; k < 3; ++k)
-          if (walk.schedule.active(k, frame)) expected.activateContact(walk.schedule.names[k]);
-        expected.computeNL(3.5, walk.motion.q.col(frame), walk.motion.v.col(frame),
-                           walk.motion.a.col(frame), Vector6::Zero(), flat);
-        const auto status = expected.distributeForce(
-            expected.getGroundCoMForce(), expected.getGroundCoMTorque(), expected.getCoM());
-
-        BOOST_TEST(close(result.com.col(frame), expected.getCoM()));
-        BOOST_TEST(close(result.vcom.col(frame), expected.getVCoM()));
-        BOOST_TEST(close(result.acom.col(frame), expected.getACoM()));
-        BOOST_TEST(close(result.am.col(frame), expected.getAM()));
-        BOOST_TEST(close(result.dam.col(frame), expected.getAMVariation()));
-        BOOST_TEST(close(result.ground_force.col(frame), expected.getGroundCoMForce()));
-        BOOST_TEST(close(result.ground_torque.col(frame), expected.getGroundCoMTorque()));
-        BOOST_TEST(sameOrNaN(result.cop.col(frame), expected.getCoP(), 1e-9));
-        BOOST_TEST(close(result.vrp.col(frame), expected.getVRP(), 1e-9));
-        BOOST_TEST(sameOrNaN(result.nl.col(frame), expected.getNL(), 1e-9));
-        BOOST_TEST(result.status[frame] == status);
-        ++count[status];
-
-        Vector6 sum = Vector6::Zero();
-        for (const auto& contact : result.contacts) {
-          const ContactBase& known = *expected.getContact(contact.name);
-          Vector6 wrench = Vector6::Zero();
-          wrench.head(known.cols()) = known.appliedForce();
-          BOOST_TEST(close(contact.wrench.col(frame), wrench, 1e-9));
-          BOOST_TEST(close(contact.vertical_force[frame], known.toWorldForces().z(), 1e-9));
-          sum += known.toCoMForces();
-        }
-        Vector6 ground;
-        ground << expected.getGroundCoMForce(), expected.getGroundCoMTorque();
-        BOOST_TEST(close(result.residual.col(frame), ground - sum, 1e-9));
-        if (status == DistributionStatus::Solved)
-          BOOST_TEST(close(result.residual.col(frame), Vector6::Zero(), 1e-6));
-      }
-    }
-  }
-  // All have been met.
-  BOOST_TEST(count[DistributionStatus::Solved] > 30);
-  BOOST_TEST(count[DistributionStatus::Relaxed] >= 2);
-  BOOST_TEST(count[DistributionStatus::NoContact] >= 2);
-}
-
-BOOST_AUTO_TEST_CASE(contacts_are_those_of_the_robot_in_its_order) {
-  Walk walk(2);
-  const auto result = analyzeMotion(walk.robot, walk.motion, walk.schedule);
-  const auto names = walk.robot.getKnownContacts();
-  BOOST_REQUIRE(result.contacts.size() == names.size());
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const auto& contact = result.contacts[i];
-    BOOST_TEST(contact.name == names[i]);
-    const auto row = std::find(walk.schedule.names.begin(), walk.schedule.names.end(), names[i]) -
-                     walk.schedule.names.begin();
-    for (Index frame = 0; frame < walk.motion.frames(); ++frame) {
-      BOOST_TEST(contact.active[frame] == walk.schedule.active(row, frame));
-      if (!contact.active[frame]) {
-        BOOST_TEST(close(contact.wrench.col(frame), Vector6::Zero(), 0.));
-        BOOST_TEST(contact.vertical_force[frame] == 0.);
-      }
+BOOST_AUTO_TEST_CASE(parabolas_have_their_own_derivatives) {
+  Random random(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    const auto model = randomTree(random);
+    const State x = randomState(model, random, 0.5);
+    const double before = random.uniform(0.01, 0.1), after = random.uniform(0.01, 0.1);
+    const auto parabola = [&](double s) { return VectorXd(s * x.v + 0.5 * s * s * x.a); };
+    // Around a frame, and on the one side of it that there is at the ends.
+    for (const double first : {-before, 0., before}) {
+      VectorXd time(3);
+      time << first, first + before, first + before + after;
+      if (first == before) time << -before - after, -before, 0.;
+      const Motion motion = differentiate(model, time, along(model, x.q, time, parabola));
+      Index frame = 0;
+      BOOST_REQUIRE(time.cwiseAbs().minCoeff(&frame) == 0.);
+      BOOST_TEST(close(motion.v.col(frame), x.v, 1e-10));
+      BOOST_TEST(close(motion.a.col(frame), x.a, 1e-8));
+      BOOST_TEST(close(motion.q.col(frame), x.q));
+      BOOST_TEST(close(motion.time, time, 0.));
     }
   }
 }
 
-BOOST_AUTO_TEST_CASE(contacts_without_schedule_are_never_active) {
-  // Although they are so in the robot.
-  Walk walk(3);
-  const auto robotsOwn = walk.robot.getActiveContacts();
-  BOOST_REQUIRE(robotsOwn.size() == 2u);
-  const ContactSchedule::Matrix rows = walk.schedule.active.bottomRows(1);
-  walk.schedule = {{"foot on sole0"}, rows};
-  const auto result = analyzeMotion(walk.robot, walk.motion, walk.schedule);
-  BOOST_REQUIRE(result.contacts.size() == 3u);
-  for (const auto& contact : result.contacts) {
-    if (contact.name == "foot on sole0") {
-      BOOST_TEST(contact.active.any());
-      continue;
-    }
-    BOOST_TEST(!contact.active.any());
-    BOOST_TEST(contact.wrench.isZero(0.));
-    BOOST_TEST(contact.vertical_force.isZero(0.));
-  }
-
-  // Nor is any, without a schedule.
-  const auto flight = analyzeMotion(walk.robot, walk.motion,
-                                    {{}, ContactSchedule::Matrix(0, walk.motion.frames())});
-  for (Index frame = 0; frame < walk.motion.frames(); ++frame) {
-    BOOST_TEST(flight.status[frame] == DistributionStatus::NoContact);
-    BOOST_TEST(close(flight.residual.col(frame).head<3>(), flight.ground_force.col(frame), 0.));
-    BOOST_TEST(close(flight.residual.col(frame).tail<3>(), flight.ground_torque.col(frame), 0.));
-  }
-}
-
-BOOST_AUTO_TEST_CASE(the_robot_is_left_as_it_is) {
-  Walk walk(4);
-  const State x = restState(walk.model);
-  walk.robot.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
-  const auto active = walk.robot.getActiveContacts(), known = walk.robot.getKnownContacts();
-  const VectorXd forces = walk.robot.allForces();
-  const MatrixXd ne = walk.robot.ne_A();
-  const Vector3d com = walk.robot.getCoM();
-  const SE3 pose = walk.robot.getContact("hand")->getPose();
-  const Vector2d nl = walk.robot.getNL();
-  BOOST_REQUIRE(forces.norm() > 1.);
-
-  analyzeMotion(walk.robot, walk.motion, walk.schedule);
-  BOOST_TEST(walk.robot.getActiveContacts() == active, boost::test_tools::per_element());
-  BOOST_TEST(walk.robot.getKnownContacts() == known, boost::test_tools::per_element());
-  BOOST_TEST(close(walk.robot.allForces(), forces, 0.));
-  BOOST_TEST(close(walk.robot.ne_A(), ne, 0.));
-  BOOST_TEST(close(walk.robot.getCoM(), com, 0.));
-  BOOST_TEST(close(walk.robot.getNL(), nl, 0.));
-  BOOST_TEST((walk.robot.getContact("hand")->getPose() == pose));
-}
-
-BOOST_AUTO_TEST_CASE(omega_is_that_of_a_pendulum_of_the_mean_height) {
-  Walk walk(5);
-  for (const double height : {0., -0.5}) {
-    walk.robot.setGroundHeight(height);
-    const auto result = analyzeMotion(walk.robot, walk.motion, walk.schedule);
-    double mean = 0.;
-    for (Index frame = 0; frame < walk.motion.frames(); ++frame)
-      mean += comOf(walk.model, walk.motion.q.col(frame)).z() / walk.motion.frames();
-    const double omega = std::sqrt(9.81 / (mean - height));
-    BOOST_TEST(close(result.omega, omega));
-    for (Index frame = 0; frame < walk.motion.frames(); ++frame) {
-      const Vector2d vrp =
-          (result.com.col(frame) - result.acom.col(frame) / (omega * omega)).head<2>();
-      BOOST_TEST(close(result.vrp.col(frame), vrp));
-      BOOST_TEST(close(result.nl.col(frame), result.cop.col(frame) - vrp));
-    }
-  }
-}
-
-BOOST_AUTO_TEST_CASE(where_there_is_no_pendulum_there_is_no_omega) {
-  Walk walk(6);
-  // The CoM is below the ground.
-  walk.robot.setGroundHeight(100.);
-  auto result = analyzeMotion(walk.robot, walk.motion, walk.schedule);
-  BOOST_TEST(std::isnan(result.omega));
-  BOOST_TEST(allNaN(result.vrp));
-  BOOST_TEST(allNaN(result.nl));
-  BOOST_TEST(result.com.allFinite());
-
-  // There is no gravity.
-  walk.model.gravity.setZero();
-  DynaCoM afloat(walk.model);
-  result = analyzeMotion(afloat, walk.motion, {{}, ContactSchedule::Matrix(0, 40)});
-  BOOST_TEST(std::isnan(result.omega));
-  BOOST_TEST(allNaN(result.vrp));
-
-  // An omega that is given is taken all the same.
-  AnalysisSettings settings;
-  settings.omega = 3.;
-  result = analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
-  BOOST_TEST(result.omega == 3.);
-  BOOST_TEST(result.vrp.allFinite());
-}
-
-BOOST_AUTO_TEST_CASE(progress_is_told) {
-  Walk walk(7, 700);
-  AnalysisSettings settings;
-  std::mutex mutex;
-  std::vector<Index> told;
-  settings.progress = [&](Index frames) {
-    const std::lock_guard<std::mutex> lock(mutex);
-    told.push_back(frames);
+BOOST_AUTO_TEST_CASE(derivatives_are_those_that_pinocchio_takes) {
+  // The body's velocity gives back the next configuration, and a is how v changes: both to the
+  // order of the formula, so that half the step has a quarter of the error.
+  Random random(2);
+  const auto model = randomTree(random);
+  const State x = randomState(model, random, 0.5);
+  const VectorXd other = random.vector(model.nv);
+  const auto path = [&](double t) {
+    return VectorXd(std::sin(2. * t) * x.v + std::cos(3. * t) * other);
   };
-  analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
-  BOOST_REQUIRE(told.size() >= 2u);
-  for (const Index frames : told) BOOST_TEST((frames > 0 && frames <= 700));
-  BOOST_TEST(told.back() == 700);
+  double errors[2] = {};
+  for (const int halved : {0, 1}) {
+    const double step = halved ? 0.005 : 0.01;
+    const VectorXd time = VectorXd::LinSpaced(21, 0., 20. * step);
+    const Motion motion = differentiate(model, time, along(model, x.q, time, path));
+    // At the middle, against the same in a hundredth of the time.
+    const double middle = 10. * step, fine = step / 100.;
+    const VectorXd fine_time = VectorXd::LinSpaced(5, middle - 2. * fine, middle + 2. * fine);
+    const Motion exact = differentiate(model, fine_time, along(model, x.q, fine_time, path));
+    errors[halved] = (motion.v.col(10) - exact.v.col(2)).norm();
+    BOOST_TEST(close((exact.v.col(3) - exact.v.col(1)) / (2. * fine), exact.a.col(2), 1e-3));
+  }
+  BOOST_TEST(errors[0] > 1e-6);
+  BOOST_TEST(errors[0] / errors[1] > 3.5);
 }
 
-BOOST_AUTO_TEST_CASE(a_motion_that_is_not_valid_is_refused_by_array_and_frame) {
-  const Walk walk(8);
-  BOOST_CHECK_NO_THROW(walk.motion.validate(walk.model));
-  const auto refused = [&](auto change, std::initializer_list<std::string> words) {
-    Motion bad = walk.motion;
-    change(bad);
-    BOOST_TEST(throws<std::invalid_argument>([&] { bad.validate(walk.model); }, words));
-    BOOST_TEST(throws<std::invalid_argument>([&] { analyzeMotion(walk.robot, bad, walk.schedule); },
+BOOST_AUTO_TEST_CASE(short_motions_have_derivatives_too) {
+  Random random(3);
+  const auto model = randomTree(random);
+  const State x = randomState(model, random, 0.5);
+  const auto line = [&](double s) { return VectorXd(s * x.v); };
+  VectorXd time(2);
+  time << 1., 1.25;
+  const Motion two = differentiate(model, time, along(model, x.q, time, line));
+  BOOST_TEST(close(two.v.col(0), two.v.col(1)));
+  BOOST_TEST(close(moved(model, two.q.col(0), 0.25 * two.v.col(0)), two.q.col(1)));
+  BOOST_TEST(two.a.isZero(0.));
+  const Motion one = differentiate(model, time.head(1), x.q);
+  BOOST_TEST(one.v.isZero(0.));
+  BOOST_TEST(one.a.isZero(0.));
+  BOOST_CHECK_NO_THROW(one.validate(model));
+}
+
+BOOST_AUTO_TEST_CASE(what_is_steady_passes_the_filter) {
+  // Straight on through the world while turning, to the ends.
+  const auto model = spinner();
+  Random random(4);
+  const Vector3d start = random.vector3(), velocity = random.vector3(), spin = random.vector3(3.);
+  MatrixXd q(model.nq, 200);
+  for (Index frame = 0; frame < q.cols(); ++frame) {
+    const double t = 0.02 * static_cast<double>(frame);
+    q.col(frame).head<3>() = start + t * velocity;
+    q.col(frame).segment<4>(3) =
+        Eigen::Quaterniond(Eigen::AngleAxisd(t * spin.norm(), spin.normalized())).coeffs();
+    q(7, frame) = 1. - 2. * t;
+  }
+  // The filter forgets how it began.
+  const MatrixXd filtered = filterConfigurations(model, q, 50., 3.);
+  BOOST_TEST(close(filtered, q, 1e-6));
+  BOOST_TEST(filtered.allFinite());
+}
+
+BOOST_AUTO_TEST_CASE(the_filter_halves_its_cut_off_and_delays_nothing) {
+  const auto model = spinner();
+  const double rate = 100.;
+  const Index frames = 8000;
+  const auto gain = [&](double frequency, double cutoff) {
+    MatrixXd q = restState(model).q.replicate(1, frames);
+    for (Index frame = 0; frame < frames; ++frame)
+      q(7, frame) = std::sin(2. * kPi * frequency * static_cast<double>(frame) / rate);
+    const MatrixXd filtered = filterConfigurations(model, q, rate, cutoff);
+    const Eigen::RowVectorXd middle = filtered.row(7).segment(3500, 1000);
+    const Eigen::RowVectorXd was = q.row(7).segment(3500, 1000);
+    const double factor = middle.dot(was) / was.squaredNorm();
+    BOOST_TEST((middle - factor * was).norm() <= 1e-6 * was.norm());  // in phase
+    return factor;
+  };
+  for (const double cutoff : {0.7, 5., 20., 39.}) {
+    BOOST_TEST(close(gain(cutoff, cutoff), 0.5, 1e-6));
+    // 1 / (1 + (tan(π f / rate) / tan(π cutoff / rate))⁸)
+    for (const double part : {0.3, 0.8, 1.1}) {
+      const double f = part * cutoff;
+      const double ratio = std::tan(kPi * f / rate) / std::tan(kPi * cutoff / rate);
+      BOOST_TEST(close(gain(f, cutoff), 1. / (1. + std::pow(ratio, 8.)), 1e-6));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(the_filter_knows_no_direction) {
+  // Moving the world, mirroring time, or taking −quaternion for quaternion changes nothing.
+  Random random(5);
+  const auto model = spinner();
+  MatrixXd q(model.nq, 60);
+  q.col(0) = randomState(model, random).q;
+  for (Index frame = 1; frame < q.cols(); ++frame)
+    q.col(frame) = moved(model, q.col(frame - 1), random.vector(model.nv, 0.05));
+  const MatrixXd filtered = filterConfigurations(model, q, 60., 6.);
+  BOOST_TEST((filtered - q).norm() > 0.01);
+
+  const SE3 shift = random.placement();
+  MatrixXd shifted = q;
+  for (Index frame = 0; frame < q.cols(); ++frame) {
+    const SE3 placement = shift * placementOf(q.col(frame));
+    shifted.col(frame).head<3>() = placement.translation();
+    shifted.col(frame).segment<4>(3) = Eigen::Quaterniond(placement.rotation()).coeffs();
+    if (random.coin()) shifted.col(frame).segment<4>(3) *= -1.;
+  }
+  const MatrixXd filtered_shifted = filterConfigurations(model, shifted, 60., 6.);
+  for (Index frame = 0; frame < q.cols(); ++frame) {
+    const SE3 expected = shift * placementOf(filtered.col(frame));
+    BOOST_TEST(close(placementOf(filtered_shifted.col(frame)).toHomogeneousMatrix(),
+                     expected.toHomogeneousMatrix()));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_filter_out_of_range_is_refused) {
+  const auto model = spinner();
+  const MatrixXd q = restState(model).q.replicate(1, 10);
+  BOOST_CHECK_NO_THROW(filterConfigurations(model, q, 50., 19.9));
+  const auto refused = [&](double rate, double cutoff, std::initializer_list<std::string> words) {
+    BOOST_TEST(throws<std::invalid_argument>([&] { filterConfigurations(model, q, rate, cutoff); },
                                              words));
   };
-  const auto nq = walk.model.nq, nv = walk.model.nv;
-  const auto text = [](auto number) { return std::to_string(number); };
-  // Rows that are not the model's.
-  refused([&](Motion& bad) { bad.q.conservativeResize(nq - 1, 40); },
-          {"q", text(nq), text(nq - 1)});
-  refused([&](Motion& bad) { bad.v.conservativeResize(nv - 1, 40); },
-          {"v", text(nv), text(nv - 1)});
-  refused([&](Motion& bad) { bad.a.conservativeResize(nv - 1, 40); },
-          {"a", text(nv), text(nv - 1)});
-  // Columns that are not the time's.
-  refused([&](Motion& bad) { bad.q.conservativeResize(nq, 39); }, {"q", "40", "39"});
-  refused([&](Motion& bad) { bad.v.conservativeResize(nv, 39); }, {"v", "40", "39"});
-  refused([&](Motion& bad) { bad.a.conservativeResize(nv, 39); }, {"a", "40", "39"});
-  // Numbers that are none.
-  for (const double number : {kNaN, 1. / 0., -1. / 0.}) {
-    refused([&](Motion& bad) { bad.q(1, 17) = number; }, {"q", "17"});
-    refused([&](Motion& bad) { bad.v(1, 17) = number; }, {"v", "17"});
-    refused([&](Motion& bad) { bad.a(1, 17) = number; }, {"a", "17"});
-    refused([&](Motion& bad) { bad.time[17] = number; }, {"time", "17"});
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refused(50., 20., {"cutoff", "20", "0.4"});
+  refused(50., 0., {"cutoff", "0"});
+  refused(50., -1., {"cutoff", "-1"});
+  refused(50., nan, {"cutoff", "nan"});
+  refused(0., 1., {"rate", "0"});
+  refused(nan, 1., {"rate", "nan"});
+  MatrixXd bad = q;
+  bad(0, 3) = nan;
+  BOOST_TEST(throws<std::invalid_argument>([&] { filterConfigurations(model, bad, 50., 5.); },
+                                           {"q", "3"}));
+  bad = q;
+  bad(6, 4) = 0.5;
+  BOOST_TEST(throws<std::invalid_argument>([&] { filterConfigurations(model, bad, 50., 5.); },
+                                           {"q", "quaternions", "4"}));
+  BOOST_TEST(throws<std::invalid_argument>(
+      [&] { differentiate(model, VectorXd::LinSpaced(9, 0., 1.), q); }, {"q", "9", "10"}));
+  BOOST_TEST(throws<std::invalid_argument>([&] { differentiate(model, VectorXd::Zero(10), q); },
+                                           {"time", "increase"}));
+  // One frame is its own mean.
+  BOOST_TEST(close(filterConfigurations(model, q.leftCols(1), 50., 5.), q.leftCols(1), 0.));
+}
+
+BOOST_AUTO_TEST_CASE(derivatives_of_any_integrator_fit_and_others_do_not) {
+  Random random(6);
+  const auto model = randomTree(random);
+  const Index frames = 30;
+  for (const bool semi_implicit : {false, true}) {
+    Motion motion{VectorXd::LinSpaced(frames, 0., 0.58), MatrixXd(model.nq, frames),
+                  MatrixXd(model.nv, frames), MatrixXd(model.nv, frames)};
+    const double step = motion.time[1] - motion.time[0];
+    State x = randomState(model, random);
+    for (Index frame = 0; frame < frames; ++frame) {
+      x.a = random.vector(model.nv);
+      motion.q.col(frame) = x.q;
+      motion.v.col(frame) = x.v;
+      motion.a.col(frame) = x.a;
+      const VectorXd next = x.v + step * x.a;
+      x.q = moved(model, x.q, step * (semi_implicit ? next : x.v));
+      x.v = next;
+    }
+    auto mismatch = compareDerivatives(model, motion);
+    BOOST_TEST(mismatch.velocity < 1e-10);
+    BOOST_TEST(mismatch.acceleration < 1e-10);
+    Motion wrong = motion;
+    wrong.v *= 1.1;
+    wrong.a *= 1.1;
+    mismatch = compareDerivatives(model, wrong);
+    BOOST_TEST(close(mismatch.velocity, 1. - 1. / 1.1, 0.01));
+    BOOST_TEST(mismatch.acceleration < 1e-10);
+    wrong = motion;
+    wrong.a *= -1.;
+    mismatch = compareDerivatives(model, wrong);
+    BOOST_TEST(mismatch.velocity < 1e-10);
+    BOOST_TEST(mismatch.acceleration > 1.);
   }
-  // Time that stands still, or goes back.
-  refused([&](Motion& bad) { bad.time[17] = bad.time[16]; }, {"time", "17"});
-  refused([&](Motion& bad) { bad.time[17] = -1.; }, {"time", "17", "-1"});
-}
-
-BOOST_AUTO_TEST_CASE(a_schedule_that_is_not_valid_is_refused) {
-  const Walk walk(9);
-  BOOST_CHECK_NO_THROW(walk.schedule.validate(40));
-  const auto refused = [&](auto change, std::initializer_list<std::string> words) {
-    ContactSchedule bad = walk.schedule;
-    change(bad);
-    BOOST_TEST(throws<std::invalid_argument>([&] { bad.validate(40); }, words));
-    BOOST_TEST(
-        throws<std::invalid_argument>([&] { analyzeMotion(walk.robot, walk.motion, bad); }, words));
-  };
-  refused([](auto& bad) { bad.names[2] = "hand"; }, {"hand"});
-  refused([](auto& bad) { bad.active.resize(3, 39); }, {"active", "40", "39"});
-  refused([](auto& bad) { bad.active.resize(2, 40); }, {"active", "3", "2"});
-
-  // A name that the robot does not know; the message tells those that it does.
-  ContactSchedule bad = walk.schedule;
-  bad.names[0] = "tail";
-  BOOST_TEST(throws<std::invalid_argument>([&] { analyzeMotion(walk.robot, walk.motion, bad); },
-                                           {"tail", "hand", "foot on sole0", "foot on sole1"}));
-}
-
-BOOST_AUTO_TEST_CASE(an_omega_out_of_range_is_refused) {
-  const Walk walk(10);
-  for (const double omega : {-0.25, kNaN, std::numeric_limits<double>::infinity()}) {
-    AnalysisSettings settings;
-    settings.omega = omega;
-    BOOST_TEST(throws<std::invalid_argument>(
-        [&] { analyzeMotion(walk.robot, walk.motion, walk.schedule, settings); },
-        {"AnalysisSettings.omega", omega < 0.          ? "-0.25"
-                                   : std::isnan(omega) ? "nan"
-                                                       : "inf"}));
+  // An error of the root alone is not hidden by the joints, nor one of its place by its turning.
+  for (const Index row : {0, 1, 2, 3, 4, 5, 6}) {
+    Motion shifted{VectorXd::LinSpaced(frames, 0., 0.58), MatrixXd(model.nq, frames),
+                   MatrixXd::Zero(model.nv, frames), MatrixXd::Zero(model.nv, frames)};
+    shifted.v.bottomRows(model.nv - 6).setConstant(3.);
+    for (Index frame = 0; frame < frames; ++frame)
+      shifted.q.col(frame) =
+          moved(model, restState(model).q, shifted.time[frame] * shifted.v.col(frame));
+    BOOST_TEST(compareDerivatives(model, shifted).velocity < 1e-10);
+    shifted.a.row(row).setConstant(1.);
+    BOOST_TEST(compareDerivatives(model, shifted).acceleration > 0.2);
+    shifted.a.setZero();
+    shifted.v.row(row).array() += row < 6 ? 0.05 : 2.;
+    BOOST_TEST(compareDerivatives(model, shifted).velocity > 0.1);
   }
-}
-
-BOOST_AUTO_TEST_CASE(a_robot_that_was_never_initialised_is_refused) {
-  const Walk walk(11);
-  BOOST_TEST(throws<NotReadyError>([&] { analyzeMotion(DynaCoM(), walk.motion, walk.schedule); },
-                                   {"initialize"}));
+  // At rest there is nothing to differ.
+  const VectorXd zero = VectorXd::Zero(model.nv);
+  const Motion rest{VectorXd::LinSpaced(3, 0., 1.), restState(model).q.replicate(1, 3),
+                    zero.replicate(1, 3), zero.replicate(1, 3)};
+  BOOST_TEST(compareDerivatives(model, rest).velocity == 0.);
+  BOOST_TEST(compareDerivatives(model, rest).acceleration == 0.);
 }

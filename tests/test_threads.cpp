@@ -12,7 +12,7 @@
 
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
-#include "dynacom/motion.hpp"
+#include "dynacom/motion_analysis.hpp"
 #include "feet.hpp"
 #include "random_robot.hpp"
 

@@ -81,4 +81,10 @@ DYNACOM_EXPORT Eigen::Vector2d computeFlatGroundCoP(
 /// @throws std::invalid_argument unless ω > 0
 DYNACOM_EXPORT Eigen::Vector2d computeVRP(const CentroidalState& state, double omega);
 
+/// Divergent component of motion on the ground's plane, equation (20): ξ = c + ċ / ω [m]; NaN where
+/// that is beyond the largest numbers.
+/// @param omega  ω > 0, natural frequency of the linear inverted pendulum [rad/s]
+/// @throws std::invalid_argument unless ω > 0
+DYNACOM_EXPORT Eigen::Vector2d computeDCM(const CentroidalState& state, double omega);
+
 }  // namespace dynacom

@@ -59,6 +59,7 @@ class DYNACOM_EXPORT Contact6D : public ContactBase {
   std::shared_ptr<ContactBase> clone() const override;
   const Contact6DSettings& getSettings() const { return settings_; }
   const std::string& getFrameName() const override { return settings_.frame_name; }
+  Eigen::Matrix2Xd getCorners() const override;
   double getFrictionUsage() const override;
   double getCoPMargin() const override;
   double getYawUsage() const override;

@@ -61,6 +61,10 @@ class DYNACOM_EXPORT ContactBase {
   /// (ContactPointSettings::world_aligned, ContactPointSettings::radius).
   virtual SE3 getSurfacePose() const { return pose_; }
 
+  /// Corners of the surface, in its plane (x, y of s) and in order around it, 2 × corners [m]: of
+  /// points, and of kinds that know of none, the origin.
+  virtual Eigen::Matrix2Xd getCorners() const { return Eigen::Matrix2Xd::Zero(2, 1); }
+
   /// Number of rows of uni_A(), of fri_A(), and number of components of λ.
   Eigen::Index uni_rows() const { return uni_A_.rows(); }
   Eigen::Index fri_rows() const { return fri_A_.rows(); }

@@ -16,7 +16,9 @@ namespace dynacom {
 
 /// What describes a DynaCoM.
 struct DYNACOM_EXPORT DynaCoMSettings {
-  /// The robot: path of a URDF file, or the XML itself. Its root joint will be a free-flyer.
+  /// The robot: path of a URDF file, or the XML itself. Its root joint will be a free-flyer: its
+  /// own, where a massless root link holds all others by a floating joint, whose origin is left
+  /// out.
   std::string urdf;
   /// Gravity, along −z or zero [m/s²].
   Eigen::Vector3d gravity = Eigen::Vector3d(0., 0., -9.81);

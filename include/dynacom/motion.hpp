@@ -2,11 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
-#include <string>
-#include <vector>
+#include <pinocchio/multibody.hpp>
 
-#include "dynacom/dyna_com.hpp"
+#include "dynacom/export.hpp"
 
 namespace dynacom {
 
@@ -25,63 +23,48 @@ struct DYNACOM_EXPORT Motion {
   void validate(const pinocchio::Model& model) const;
 };
 
-/// Which contacts are active when.
-struct DYNACOM_EXPORT ContactSchedule {
-  using Matrix = Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic>;
+/// The largest cut-off frequency that filterConfigurations() takes, as a part of the frame rate:
+/// near a half, the filter's frequencies are squeezed together until little is left of it.
+constexpr double kMaximalCutoff = 0.4;
 
-  std::vector<std::string> names;  ///< of contacts
-  Matrix active;                   ///< names.size() × frames
+/// Configurations without what is faster than a cut-off frequency: a Butterworth filter of fourth
+/// order, forward and backward, so that nothing is delayed and the gain at the cut-off is ½.
+///
+/// Positions of free-flyers are filtered in the world, orientations and joints in the tangent space
+/// at the filter's last output, which slides along the motion: for joints that are numbers this is
+/// the ordinary filter. Beyond both ends, the motion is continued by its point reflection there.
+/// @param q       configurations, nq × frames
+/// @param rate    frames per second, evenly spaced [Hz]
+/// @param cutoff  0 < cutoff < kMaximalCutoff rate [Hz]
+/// @return nq × frames
+/// @throws std::invalid_argument unless rate and cutoff are in their ranges, q has nq finite rows,
+///         and its quaternions have norm 1
+DYNACOM_EXPORT Eigen::MatrixXd filterConfigurations(const pinocchio::Model& model,
+                                                    const Eigen::MatrixXd& q, double rate,
+                                                    double cutoff);
 
-  /// @throws std::invalid_argument if a name is there twice, or active has another size
-  void validate(Eigen::Index frames) const;
+/// The motion through given configurations: velocities and accelerations are those of the parabola
+/// through a frame and its two neighbours, in the tangent space at the frame, so that they are as
+/// Pinocchio wants them. At both ends it is the neighbour's parabola.
+/// @param time  frames, strictly increasing [s]
+/// @param q     configurations, nq × frames
+/// @throws std::invalid_argument as Motion::validate()
+DYNACOM_EXPORT Motion differentiate(const pinocchio::Model& model, const Eigen::VectorXd& time,
+                                    const Eigen::MatrixXd& q);
+
+/// How well derivatives fit what they are the derivatives of.
+struct DerivativeMismatch {
+  /// ‖(q[k+1] ⊖ q[k])/Δt − v‖ as a part of ‖v‖, and ‖(v[k+1] − v[k])/Δt − a‖ of ‖a‖, both root mean
+  /// squares over the steps, the worst of three: the free-flyer's linear and angular part, and the
+  /// joints. v and a are those at the step's beginning, at its end, or their mean, whichever fits
+  /// best, because integrators differ. What hardly moves is a part of 0.05 m/s or rad/s, and of
+  /// 0.5 m/s² or rad/s², at least.
+  double velocity, acceleration;
 };
 
-/// What analyzeMotion() needs to know besides.
-struct DYNACOM_EXPORT AnalysisSettings {
-  /// Whether the centre of pressure is that of flat horizontal ground; see
-  /// DynaCoM::computeDynamics.
-  bool flat_horizontal_ground = true;
-  /// ω of the virtual repellent point [rad/s]. 0 stands for √(g / mean height of the CoM above the
-  /// ground).
-  double omega = 0.;
-  /// Called now and then with the number of frames done.
-  std::function<void(Eigen::Index)> progress;
-
-  /// @throws std::invalid_argument unless omega is finite and >= 0
-  void validate() const;
-};
-
-/// What analyzeMotion() found: one column per frame, in the world's axes, SI units.
-struct MotionAnalysis {
-  /// What one contact does.
-  struct Contact {
-    std::string name;
-    Eigen::Array<bool, Eigen::Dynamic, 1> active;
-    /// Wrench (force, moment) in the surface's frame, about its origin; zero where not active.
-    Eigen::Matrix<double, 6, Eigen::Dynamic> wrench;
-    /// Vertical component of the force, in the world [N].
-    Eigen::VectorXd vertical_force;
-  };
-
-  double omega;  ///< The ω in use; NaN where there is none, and then vrp and nl are NaN.
-  Eigen::VectorXd time;
-  Eigen::Matrix3Xd com, vcom, acom;              ///< c, ċ, c̈
-  Eigen::Matrix3Xd am, dam;                      ///< L, L̇
-  Eigen::Matrix3Xd ground_force, ground_torque;  ///< about c
-  Eigen::Matrix2Xd cop, vrp, nl;
-  std::vector<DistributionStatus> status;
-  /// Ground wrench minus what the contacts give, about c.
-  Eigen::Matrix<double, 6, Eigen::Dynamic> residual;
-  std::vector<Contact> contacts;  ///< all, as getKnownContacts() of the robot
-};
-
-/// Computes dynamics and distribution for every frame of a motion, whose contacts are placed by the
-/// model: a pose that was measured once says nothing of them. The robot given is left as it is.
-/// @throws std::invalid_argument if motion or schedule is not valid, or the schedule names a
-///         contact that the robot does not know; contacts without schedule are never active.
-///         NotReadyError before the robot's initialize()
-DYNACOM_EXPORT MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
-                                            const ContactSchedule& schedule,
-                                            const AnalysisSettings& settings = AnalysisSettings());
+/// Compares a motion's derivatives with its differences.
+/// @throws std::invalid_argument as Motion::validate()
+DYNACOM_EXPORT DerivativeMismatch compareDerivatives(const pinocchio::Model& model,
+                                                     const Motion& motion);
 
 }  // namespace dynacom

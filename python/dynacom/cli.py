@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """The command ``dynacom``.
 
-Exit status 0 when what was asked for was done, whatever came out; 2 for bad input, which one line
-on stderr explains.
+Exit status 0 when what was asked for was done, whatever came out; 1 where ``--check`` asked whether
+a motion is feasible, and it is not; 2 for bad input, which one line on stderr explains.
 """
 
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,6 +30,8 @@ app = typer.Typer(
 
 def main() -> None:
     """Runs the command with the arguments of the process, and exits."""
+    # As Ctrl-C, so that nothing half-written stays behind.
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
     try:
         app(prog_name="dynacom")
     except (DynacomError, ValueError, KeyError, OSError) as error:
@@ -75,96 +78,262 @@ def robots() -> None:
     Console().print(table)
 
 
+_Clip = Annotated[
+    Path,
+    typer.Argument(metavar="CLIP", help="Motion: .csv, .npz, .parquet or .pkl, see docs/files.md."),
+]
+_RobotName = Annotated[
+    str | None, typer.Option("--robot", metavar="NAME|FILE.yaml", help="See 'dynacom robots'.")
+]
+_Urdf = Annotated[
+    Path | None, typer.Option("--urdf", metavar="FILE", help="A robot without a robot file.")
+]
+_Contacts = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--contact",
+        metavar="FRAME:KIND:KEY=VALUE,...",
+        help="With --urdf: a contact, of kind point or 6d, such as "
+        "sole:6d:half_length=0.1,half_width=0.05,mu=0.7,gu=0.05. May be repeated.",
+    ),
+]
+_Payloads = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--payload",
+        metavar="FRAME:MASS[@x,y,z]",
+        help="A load that the robot carries [kg], [m]. May be repeated.",
+    ),
+]
+_Fps = Annotated[
+    float | None, typer.Option(metavar="HZ", help="Frame rate, where the file does not say.")
+]
+_Quat = Annotated[
+    str | None,
+    typer.Option(metavar="xyzw|wxyz", help="Order of quaternions, where the file does not say."),
+]
+_Trust = Annotated[
+    bool,
+    typer.Option("--trust", help="Read pickles that may run code as they are read."),
+]
+_ClipName = Annotated[
+    str | None,
+    typer.Option("--clip", metavar="NAME", help="Which clip, where a pickle holds several."),
+]
+_Schedule = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.yaml", help="When contacts are active, such as schedule.yaml."),
+]
+_Cutoff = Annotated[
+    float | None,
+    typer.Option(
+        metavar="HZ",
+        help="Cut-off of the filter where velocities and accelerations are computed; 6 by "
+        "default, 0 for no filter.",
+    ),
+]
+_Ground = Annotated[
+    float | None,
+    typer.Option("--ground-height", metavar="H", help="Height of the ground [m]; else estimated."),
+]
+_Flat = Annotated[
+    bool | None,
+    typer.Option("--flat/--uneven", help="Is the ground flat and horizontal? See the CoP."),
+]
+_Omega = Annotated[
+    float | None,
+    typer.Option(
+        metavar="W",
+        help="Natural frequency of VRP and DCM [rad/s]; 0 for that of the CoM's mean height.",
+    ),
+]
+_SettingsFile = Annotated[
+    Path | None,
+    typer.Option("--settings", metavar="FILE.yaml", help="Settings, see docs/verdict.md."),
+]
+_Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="A setting, such as verdict.residual_force.limit=0.2. May be repeated.",
+    ),
+]
+
+
 @app.command()
 def analyze(
-    motion: Annotated[
-        Path, typer.Argument(metavar="MOTION", help="Motion: .npz with t, q, v, a and contacts.")
-    ],
-    robot: Annotated[
-        str, typer.Option(metavar="NAME|FILE.yaml", help="Robot: see 'dynacom robots'.")
-    ],
+    clip: _Clip,
+    robot: _RobotName = None,
+    urdf: _Urdf = None,
+    contact: _Contacts = None,
+    payload: _Payloads = None,
+    fps: _Fps = None,
+    quat: _Quat = None,
+    trust: _Trust = False,
+    clip_name: _ClipName = None,
+    schedule: _Schedule = None,
+    cutoff: _Cutoff = None,
+    ground_height: _Ground = None,
+    flat: _Flat = None,
+    omega: _Omega = None,
+    settings: _SettingsFile = None,
+    set_: _Set = None,
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder for the results, made if it is not there.")
-    ],
-    flat: Annotated[
-        bool,
-        typer.Option("--flat/--uneven", help="Is the ground flat and horizontal? See the CoP."),
-    ] = True,
-    omega: Annotated[
-        float,
+        Path | None,
         typer.Option(
-            metavar="W",
-            help="Natural frequency of the virtual repellent point [rad/s]; "
-            "0 for that of the CoM's mean height.",
+            metavar="DIR",
+            help="Folder for the results, made if it is not there; CLIP-analysis, where you are, "
+            "by default.",
         ),
-    ] = 0.0,
-    ground_height: Annotated[
-        float, typer.Option(metavar="H", help="Height of the flat ground in the world [m].")
-    ] = 0.0,
+    ] = None,
+    csv: Annotated[bool, typer.Option("--csv", help="Write frames.csv, too.")] = False,
+    page: Annotated[
+        bool, typer.Option("--page/--no-page", help="Write report.html? It takes the longest.")
+    ] = True,
+    check: Annotated[
+        bool, typer.Option("--check", help="Exit with status 1 if the motion is not feasible.")
+    ] = False,
 ) -> None:
-    """Analyse every frame of a motion, write DIR/frames.csv, print a summary."""
+    """Judge a motion: is it physically possible, when not and why, what do the feet feel?
+
+    Writes DIR/report.html, frames.parquet, summary.json and schedule.yaml, and prints a summary.
+    """
     from rich.console import Console
 
-    from dynacom.report import results_folder, summarize, summary_table, write_frames
+    from dynacom.summary import summary_table
 
-    subject = dynacom.load_robot(robot)
-    frames, schedule, _ = dynacom.read_motion(motion)
-    if schedule is None:
-        raise DynacomError(f"{motion}: missing arrays 'contacts' and 'contact_names'")
-
-    dynamics = subject.dynacom()
-    dynamics.setGroundHeight(ground_height)
-    try:
-        with _progress(len(frames.time)) as progress:
-            analysis = dynacom.analyzeMotion(
-                dynamics, frames, schedule, flat, omega=omega, progress=progress
-            )
-    except ValueError as error:
-        raise DynacomError(f"{motion}: {error}") from error
-
-    try:
-        with results_folder(out) as folder:
-            write_frames(analysis, folder / "frames.csv")
-    except OSError as error:
-        raise DynacomError(f"{out}: cannot be written ({error.strerror or error})") from error
-
-    gravity = -float(subject.model.gravity.linear[2])
+    report = _analyze(
+        clip,
+        _load_robot(robot, urdf, contact, payload),
+        schedule,
+        _make_options(settings, set_, cutoff, ground_height, flat, omega),
+        fps=fps,
+        quat=quat,
+        trust=trust,
+        clip=clip_name,
+    )
+    name = Path(clip.name.removesuffix(".gz")).stem
+    files = report.save(out or Path(f"{name}-analysis"), csv=csv, page=page)
     console = Console()
-    console.print(summary_table(summarize(analysis, dynamics.getMass(), gravity)))
-    console.print(f"Wrote {out / 'frames.csv'}", highlight=False, markup=False, soft_wrap=True)
+    console.print(summary_table(report.summary))
+    for file in files:
+        console.print(f"Wrote {file}", highlight=False, markup=False, soft_wrap=True)
+    if check and not report.verdict.feasible:
+        raise typer.Exit(1)
+
+
+@app.command()
+def show(
+    clip: _Clip,
+    robot: _RobotName = None,
+    urdf: _Urdf = None,
+    contact: _Contacts = None,
+    payload: _Payloads = None,
+    fps: _Fps = None,
+    quat: _Quat = None,
+    trust: _Trust = False,
+    clip_name: _ClipName = None,
+    schedule: _Schedule = None,
+    cutoff: _Cutoff = None,
+    ground_height: _Ground = None,
+    flat: _Flat = None,
+    omega: _Omega = None,
+    settings: _SettingsFile = None,
+    set_: _Set = None,
+    port: Annotated[int, typer.Option(help="Port of the viewer on this machine.")] = 8080,
+) -> None:
+    """Show a motion in a browser, with what its contacts feel, until Ctrl-C."""
+    from dynacom import scene
+
+    report = _analyze(
+        clip,
+        _load_robot(robot, urdf, contact, payload),
+        schedule,
+        _make_options(settings, set_, cutoff, ground_height, flat, omega),
+        fps=fps,
+        quat=quat,
+        trust=trust,
+        clip=clip_name,
+    )
+    scene.show(
+        report.robot,
+        report.motion.q,
+        report.arrays,
+        report.summary,
+        port=port,
+        announce=lambda url: typer.echo(f"Open {url} (Ctrl-C to stop)"),
+    )
+
+
+def _analyze(motion, robot, schedule, options, **reading) -> "dynacom.MotionReport":
+    with _progress() as progress:
+        return dynacom.analyze(
+            motion, robot, schedule=schedule, options=options, progress=progress, **reading
+        )
+
+
+def _load_robot(
+    name: str | None, urdf: Path | None, contacts: list[str] | None, payloads: list[str] | None
+) -> "dynacom.Robot":
+    from dynacom.robots import make_robot, parse_payload
+
+    if (name is None) == (urdf is None):
+        raise DynacomError("the robot must be given by --robot, or by --urdf and --contact")
+    if urdf is None and contacts:
+        raise DynacomError("--contact goes with --urdf: a robot file has its own contacts")
+    robot = dynacom.load_robot(name) if urdf is None else make_robot(urdf, contacts or [])
+    for text in payloads or []:
+        robot = robot.with_payload(*parse_payload(text))
+    return robot
+
+
+def _make_options(
+    file: Path | None,
+    texts: list[str] | None,
+    cutoff: float | None,
+    ground_height: float | None,
+    flat: bool | None,
+    omega: float | None,
+) -> "dynacom.AnalysisOptions":
+    options = dynacom.AnalysisOptions()
+    if file is not None:
+        options.update_from_file(file)
+    options.update_from_texts(texts or [])
+    values = {"cutoff": cutoff, "flat": flat, "omega": omega}
+    given = {name: value for name, value in values.items() if value is not None}
+    if cutoff == 0.0:
+        given["cutoff"] = None
+    if ground_height is not None:
+        given["detection"] = {"ground_height": ground_height}
+    options.update(given, "options")
+    return options
 
 
 @contextmanager
-def _progress(total: int) -> Iterator[Callable[[int], None]]:
-    """A progress bar on stderr, if that is a terminal: a function that takes the frames done."""
+def _progress() -> Iterator[Callable[[float], None]]:
+    """A progress bar on stderr, if that is a terminal: a function that takes the part done."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
-        MofNCompleteColumn,
         Progress,
-        ProgressColumn,
+        TaskProgressColumn,
         TextColumn,
         TimeRemainingColumn,
     )
-    from rich.text import Text
-
-    class RateColumn(ProgressColumn):
-        def render(self, task) -> Text:
-            return Text(f"{task.finished_speed or task.speed or 0.0:.0f} frames/s")
 
     console = Console(stderr=True)
     if not console.is_terminal:
         # Not None: Python notices Ctrl-C in C++ code only when that calls it.
-        yield lambda done: None
+        yield lambda part: None
         return
     with Progress(
         TextColumn("Analysing"),
         BarColumn(),
-        MofNCompleteColumn(),
-        RateColumn(),
+        TaskProgressColumn(),
         TimeRemainingColumn(),
         console=console,
         transient=True,
     ) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda done: bar.update(task, completed=done)
+        task = bar.add_task("", total=1.0)
+        yield lambda part: bar.update(task, completed=part)

@@ -2,115 +2,70 @@
 """Motions from files."""
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from dynacom.dynacom_pywrap import ContactSchedule, Motion
 from dynacom.errors import DynacomError
+from dynacom.motion_clip import Clip, Options
+from dynacom.motion_csv import read_csv
+from dynacom.motion_npz import read_npz
+from dynacom.motion_parquet import read_parquet
+from dynacom.motion_pickle import read_pickle
+from dynacom.robots import Robot
+
+__all__ = ["Clip", "read_motion"]
+
+_READERS = {
+    ".csv": read_csv,
+    ".csv.gz": read_csv,
+    ".parquet": read_parquet,
+    ".npz": read_npz,
+    ".pkl": read_pickle,
+    ".pickle": read_pickle,
+    ".joblib": read_pickle,
+}
 
 
-class MotionFile(NamedTuple):
-    """What a motion file holds."""
-
-    motion: Motion
-    #: None where the file does not say when which contact is active.
-    schedule: ContactSchedule | None
-    #: The file's other arrays, by name, as they are.
-    extras: dict[str, np.ndarray]
-
-
-def read_motion(path: str | Path) -> MotionFile:
-    """Reads a motion from a NumPy archive (.npz).
-
-    The archive holds, with one row for each of T frames:
-
-    ============= ======= =====================================================================
-    t             (T,)    times, strictly increasing [s]
-    q             (T, nq) configurations, in Pinocchio's order: free-flyer's position [m] and
-                          quaternion (x, y, z, w), then the joints
-    v, a          (T, nv) velocities and accelerations, as in Pinocchio
-    contacts      (T, C)  of bool: which contacts are active; may be absent, with the next
-    contact_names (C,)    of str: their names
-    ============= ======= =====================================================================
-
-    Sizes, and the numbers themselves, are checked by ``Motion.validate``,
-    ``ContactSchedule.validate`` and :func:`analyzeMotion`, which know the robot.
-
-    Raises:
-        DynacomError: the file is not there, is not such an archive, or an array is missing, or has
-            another type or another number of dimensions.
-    """
-    try:
-        archive = np.load(path, allow_pickle=False)
-    except OSError as error:
-        raise DynacomError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except Exception as error:  # NumPy promises no type for what is no archive, or a broken one
-        raise DynacomError(f"{path}: must be a NumPy archive (.npz), got another file") from error
-    if not isinstance(archive, np.lib.npyio.NpzFile):
-        raise DynacomError(f"{path}: must be a NumPy archive (.npz), got a single array")
-    with archive:
-        return _read_archive(path, archive)
-
-
-def _read_archive(path: str | Path, archive: np.lib.npyio.NpzFile) -> MotionFile:
-    motion = Motion(
-        _read_numbers(path, archive, "t", 1),
-        _read_numbers(path, archive, "q", 2),
-        _read_numbers(path, archive, "v", 2),
-        _read_numbers(path, archive, "a", 2),
-    )
-    schedule = None
-    if "contacts" in archive or "contact_names" in archive:
-        active = _read_array(path, archive, "contacts", 2, "b", "bool")
-        names = _read_array(path, archive, "contact_names", 1, "U", "str")
-        schedule = ContactSchedule(names.tolist(), active)
-    used = {"t", "q", "v", "a", "contacts", "contact_names"}
-    extras = {}
-    for name in archive.files:
-        if name not in used:
-            try:
-                extras[name] = archive[name]
-            except Exception:
-                # Nobody asked for it, so that it may be pickled, or broken.
-                continue
-    return MotionFile(motion, schedule, extras)
-
-
-def _read_numbers(
-    path: str | Path, archive: np.lib.npyio.NpzFile, name: str, dimensions: int
-) -> np.ndarray:
-    array = _read_array(path, archive, name, dimensions, "iuf", "real numbers")
-    return array.astype(float, copy=False)
-
-
-def _read_array(
+def read_motion(
     path: str | Path,
-    archive: np.lib.npyio.NpzFile,
-    name: str,
-    dimensions: int,
-    kinds: str,
-    expected: str,
-) -> np.ndarray:
-    """An array of the archive, checked.
+    robot: Robot,
+    *,
+    fps: float | None = None,
+    quat: str | None = None,
+    trust: bool = False,
+    clip: str | None = None,
+) -> Clip:
+    """Reads a robot's motion from a file, and checks that it can be one.
+
+    docs/files.md says what the formats are; the suffix tells which: .csv, .csv.gz, .parquet, .npz,
+    .pkl (.pickle, .joblib).
 
     Args:
-        kinds: the letters of numpy.dtype.kind that will do.
-        expected: what they mean.
+        fps: frame rate [Hz], for files that have neither times nor a frame rate. It counts more
+            than a file's frame rate, and less than its times.
+        quat: order of the root's quaternion where the file does not name its components: ``xyzw``
+            or ``wxyz``. By default xyzw, in the archives of whole_body_tracking wxyz.
+        trust: whether a pickle may do whatever it likes: joblib's files cannot be read otherwise.
+        clip: name of the clip to read, where a pickle holds several.
+
+    Raises:
+        DynacomError: the file cannot be read, is in none of the formats, or is no motion of this
+            robot: other joints, quaternions of another order, degrees, numbers that are not finite,
+            times that do not increase or have a hole, a jump. The message is one line that says
+            what and where.
     """
-    if name not in archive:
-        raise DynacomError(
-            f"{path}: missing array '{name}', got {', '.join(archive.files) or 'none'}"
-        )
+    path = Path(path)
+    if quat not in (None, "xyzw", "wxyz"):
+        raise DynacomError(f"quat must be xyzw or wxyz, got '{quat}'")
+    if path.is_dir():
+        raise DynacomError(f"{path}: cannot be read (Is a directory)")
+    suffix = path.suffix.lower()
+    if suffix == ".gz":
+        suffix = "".join(path.suffixes[-2:]).lower()
+    if suffix not in _READERS:
+        raise DynacomError(f"{path}: must end in one of {', '.join(_READERS)}, got '{path.name}'")
     try:
-        array = np.asarray(archive[name])
-    except Exception as error:  # as above
-        raise DynacomError(f"{path}: array '{name}' cannot be read ({error})") from error
-    if array.dtype.kind not in kinds:
-        raise DynacomError(f"{path}: array '{name}' must be of {expected}, got {array.dtype}")
-    if array.ndim != dimensions:
-        raise DynacomError(
-            f"{path}: array '{name}' must have {dimensions} dimension{'s'[: dimensions - 1]}, "
-            f"got shape {array.shape}"
-        )
-    return array
+        with np.errstate(all="ignore"):  # what overflows is refused
+            return _READERS[suffix](path, robot, Options(fps, quat, trust, clip))
+    except OSError as error:
+        raise DynacomError(f"{path}: cannot be read ({error.strerror or error})") from error

@@ -19,20 +19,25 @@ A robot file is YAML::
         # kind point only, optional
         world_aligned: true
         radius: 0.02
+    default:                  # optional: joints that are not zero where nothing is known of them
+      left_elbow_joint: 0.5   #   [rad], or [m] where they slide
+    joint_layouts:            # optional: joints of the robot's smaller versions, in their order
+      - [left_hip_joint, left_knee_joint, right_hip_joint, right_knee_joint]
 
 The keys from ``mu`` on are the fields of ``Contact6DSettings`` and ``ContactPointSettings``, and
 mean the same. The files in the package's folder ``robots`` are known by their names.
 """
 
+import math
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
-import yaml
 
 from dynacom.dynacom_pywrap import (
     Contact6D,
@@ -43,6 +48,7 @@ from dynacom.dynacom_pywrap import (
     DynaCoMSettings,
 )
 from dynacom.errors import DynacomError
+from dynacom.yaml_file import is_number, read_yaml
 
 ContactSettings: TypeAlias = ContactPointSettings | Contact6DSettings
 
@@ -71,6 +77,10 @@ class RobotFile:
     urdf: str
     #: In the file's order, which is that of results.
     contacts: tuple[ContactEntry, ...]
+    #: Joint's name -> its coordinate [rad, m].
+    default: Mapping[str, float] = field(default_factory=dict)
+    #: As in :class:`Robot`.
+    joint_layouts: tuple[tuple[str, ...], ...] = ()
 
     @property
     def name(self) -> str:
@@ -87,6 +97,13 @@ class Robot:
     model: pin.Model = field(repr=False)
     #: Contact's name -> its settings, in the order of the file.
     contacts: Mapping[str, ContactSettings]
+    #: The file that the model was read from.
+    urdf: Path
+    #: (nq,) What joints are where nothing is known of them: neutral, or as the robot file says.
+    default: np.ndarray = field(repr=False, compare=False)
+    #: Names of joints, in their order, of the robot's smaller versions: for motions that have fewer
+    #: joints than the robot, and no names. No two are equally long.
+    joint_layouts: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
 
     def dynacom(self, inactive: Iterable[str] = ()) -> DynaCoM:
         """A new DynaCoM of this robot, which knows all its contacts.
@@ -111,6 +128,42 @@ class Robot:
             robot.addContact(contact, name, name not in inactive)
         return robot
 
+    def with_payload(
+        self, frame: str, mass: float, position: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> "Robot":
+        """A new robot: this one with a point mass fixed to it.
+
+        Args:
+            frame: name of a frame of the model.
+            mass: of the load, positive [kg].
+            position: (3,) of the load, in that frame [m].
+
+        Raises:
+            DynacomError: no frame, or more than one, has that name, or the frame is the world's;
+                the mass is not positive, or a number is not finite.
+        """
+        where = f"payload of {self.name}"
+        if not (math.isfinite(mass) and mass > 0.0):
+            raise DynacomError(f"{where}: mass must be positive and finite, got {mass}")
+        position = np.asarray(position, dtype=float)
+        if position.shape != (3,) or not np.isfinite(position).all():
+            raise DynacomError(f"{where}: position must be 3 finite numbers, got {position}")
+        holder = self.model.frames[_find_frame(self.model, frame, where)]
+        model = self.model.copy()
+        load = pin.Inertia(float(mass), position, np.zeros((3, 3)))
+        model.appendBodyToJoint(holder.parentJoint, load, holder.placement)
+        return replace(self, model=model)
+
+
+class Payload(NamedTuple):
+    """The arguments of :meth:`Robot.with_payload`."""
+
+    frame: str
+    #: [kg]
+    mass: float
+    #: In the frame [m].
+    position: tuple[float, float, float]
+
 
 def list_robots() -> list[Path]:
     """The robot files that come with the package, by name."""
@@ -128,14 +181,53 @@ def load_robot(name_or_path: str | Path) -> Robot:
             file, the contact and the key, what was expected and what was got.
     """
     file = read_robot_file(_find_robot_file(name_or_path))
-    model = _read_urdf(file)
-    contacts = {}
-    for entry in file.contacts:
-        frame = _find_frame(model, entry, file.path)
-        if entry.placement is not None:
-            entry.settings.frame_name = _add_frame(model, frame, entry, file.path)
-        contacts[entry.name] = entry.settings
-    return Robot(file.name, model, contacts)
+    urdf = _find_urdf(file.urdf, file.path.parent, f"{file.path}: urdf", "a file beside this one")
+    return _make_robot(file, urdf)
+
+
+def make_robot(urdf: str | Path, contacts: Iterable[str], name: str | None = None) -> Robot:
+    """A robot without a robot file.
+
+    Args:
+        urdf: path of a file, or of one in example-robot-data's folder ``robots``.
+        contacts: texts ``FRAME:KIND:KEY=VALUE,...`` with the keys of robot files, for example
+            ``left_sole:6d:half_length=0.1,half_width=0.06,mu=0.7,gu=0.08``. The numbers of a vector
+            are separated by slashes, ``xyz=0/0/0.02``. A contact without the key ``name`` has that
+            of its frame.
+        name: the robot's, by default that of the URDF file without its suffix.
+
+    Raises:
+        DynacomError: the URDF is not there or is not valid, or a text is not that of a contact; the
+            message names it, what was expected and what was got.
+    """
+    entries = [_parse_contact(text) for text in contacts]
+    if not entries:
+        raise DynacomError(f"{urdf}: contacts must be given, got none")
+    path = _find_urdf(str(urdf), Path(), "urdf", "a file")
+    _check_names(entries, path)
+    robot = _make_robot(RobotFile(path, str(urdf), tuple(entries)), path)
+    return robot if name is None else replace(robot, name=name)
+
+
+def parse_payload(text: str) -> Payload:
+    """Reads ``FRAME:MASS`` or ``FRAME:MASS@x,y,z``, in kg and m.
+
+    Whether the robot has such a frame, and whether the mass can be one, is for
+    :meth:`Robot.with_payload` to say.
+
+    Raises:
+        DynacomError: the text is another.
+    """
+    frame, _, load = text.rpartition(":")
+    mass, at, place = load.partition("@")
+    try:
+        x, y, z = map(float, place.split(",") if at else "000")
+        payload = Payload(frame, float(mass), (x, y, z))
+    except ValueError:
+        payload = None
+    if payload is None or not frame:
+        raise DynacomError(f"payload must be FRAME:MASS or FRAME:MASS@x,y,z, got '{text}'")
+    return payload
 
 
 def read_robot_file(path: str | Path) -> RobotFile:
@@ -145,23 +237,24 @@ def read_robot_file(path: str | Path) -> RobotFile:
         DynacomError: as :func:`load_robot`.
     """
     path = Path(path)
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DynacomError(f"{path}: cannot be read ({error.strerror})") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise DynacomError(f"{path}: must be YAML ({error})") from error
-
+    content = read_yaml(path)
     keys = _check_keys(content, _ROBOT_KEYS, str(path))
-    names = set()
     contacts = []
     for index, item in enumerate(keys["contacts"]):
-        entry = _read_contact(item, index, path)
-        if entry.name in names:
-            raise DynacomError(f"{path}: contact '{entry.name}': name is taken by another contact")
-        names.add(entry.name)
-        contacts.append(entry)
-    return RobotFile(path, keys["urdf"], tuple(contacts))
+        where = f"{path}: contacts[{index}]"
+        if not isinstance(item, dict):
+            raise DynacomError(f"{where} must be a mapping, got {item!r}")
+        if isinstance(item.get("name"), str):
+            where = f"{path}: contact '{item['name']}'"
+        contacts.append(_read_contact(item, where))
+    _check_names(contacts, path)
+    return RobotFile(
+        path,
+        keys["urdf"],
+        tuple(contacts),
+        keys.get("default", {}),
+        keys.get("joint_layouts", ()),
+    )
 
 
 # What a file may hold: a reader for every key. A reader returns the value to use, or raises
@@ -186,26 +279,36 @@ def _boolean(value: Any) -> bool:
     return value
 
 
-def _is_number(value: Any) -> bool:
-    # YAML's true is no number, although Python's is; its integers may be too large for a float.
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return abs(value) <= sys.float_info.max
-
-
 def _number(value: Any) -> float:
-    if not _is_number(value):
+    if not is_number(value):
         raise ValueError("a finite number")
     return float(value)
 
 
 def _numbers(count: int) -> Callable[[Any], np.ndarray]:
     def read(value: Any) -> np.ndarray:
-        if not isinstance(value, list) or len(value) != count or not all(map(_is_number, value)):
+        if not isinstance(value, list) or len(value) != count or not all(map(is_number, value)):
             raise ValueError(f"a list of {count} finite numbers")
         return np.array(value, dtype=float)
 
     return read
+
+
+def _coordinates(value: Any) -> dict[str, float]:
+    if not isinstance(value, dict) or not all(
+        isinstance(joint, str) and is_number(number) for joint, number in value.items()
+    ):
+        raise ValueError("a mapping of joints' names to finite numbers")
+    return {joint: float(number) for joint, number in value.items()}
+
+
+def _layouts(value: Any) -> tuple[tuple[str, ...], ...]:
+    if not isinstance(value, list) or not all(
+        isinstance(layout, list) and layout and all(isinstance(joint, str) for joint in layout)
+        for layout in value
+    ):
+        raise ValueError("a list of lists of joints' names")
+    return tuple(map(tuple, value))
 
 
 _Reader: TypeAlias = Callable[[Any], Any]
@@ -219,7 +322,9 @@ class _Keys:
 
 _SETTINGS = {"point": ContactPointSettings, "6d": Contact6DSettings}
 
-_ROBOT_KEYS = _Keys({"urdf": _text, "contacts": _list}, {})
+_ROBOT_KEYS = _Keys(
+    {"urdf": _text, "contacts": _list}, {"default": _coordinates, "joint_layouts": _layouts}
+)
 
 # The keys that are not fields of the settings.
 _PLACE_REQUIRED = {"name": _text, "kind": _text, "frame": _text}
@@ -261,12 +366,7 @@ def _check_keys(content: Any, keys: _Keys, where: str) -> dict[str, Any]:
     return values
 
 
-def _read_contact(item: Any, index: int, path: Path) -> ContactEntry:
-    where = f"{path}: contacts[{index}]"
-    if not isinstance(item, dict):
-        raise DynacomError(f"{where} must be a mapping, got {item!r}")
-    if isinstance(item.get("name"), str):
-        where = f"{path}: contact '{item['name']}'"
+def _read_contact(item: dict[Any, Any], where: str) -> ContactEntry:
     # First of all, because it says which other keys there may be.
     if item.get("kind") not in list(_SETTINGS):
         raise DynacomError(
@@ -291,6 +391,40 @@ def _read_contact(item: Any, index: int, path: Path) -> ContactEntry:
     return ContactEntry(values["name"], kind, settings, placement)
 
 
+def _parse_contact(text: str) -> ContactEntry:
+    where = f"contact '{text}'"
+    expected = "FRAME:KIND:KEY=VALUE,..."
+    frame, kind, *rest = text.split(":", 2) if text.count(":") > 1 else ("", "")
+    if not frame:
+        raise DynacomError(f"{where}: must be {expected}")
+    item: dict[str, Any] = {"frame": frame, "kind": kind}
+    for pair in rest[0].split(","):
+        key, equals, value = pair.partition("=")
+        if not equals:
+            raise DynacomError(f"{where}: must be {expected}, got '{pair}' for KEY=VALUE")
+        if key in item:
+            raise DynacomError(f"{where}: {key} must be given once, got '{pair}'")
+        item[key] = value if key == "name" else _parse_value(value)
+    return _read_contact({"name": frame} | item, where)
+
+
+def _parse_value(text: str) -> Any:
+    """What YAML would make of it, with slashes for lists."""
+    if text in ("true", "false"):
+        return text == "true"
+    try:
+        numbers = [float(word) for word in text.split("/")]
+    except ValueError:
+        return text
+    return numbers if len(numbers) > 1 else numbers[0]
+
+
+def _check_names(contacts: Iterable[ContactEntry], path: Path) -> None:
+    for name, count in Counter(contact.name for contact in contacts).items():
+        if count > 1:
+            raise DynacomError(f"{path}: contact '{name}': name is taken by another contact")
+
+
 def _find_robot_file(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.suffix in (".yaml", ".yml"):
@@ -304,58 +438,119 @@ def _find_robot_file(name_or_path: str | Path) -> Path:
     return known[str(name_or_path)]
 
 
-def _find_urdf(file: RobotFile) -> Path:
+def _find_urdf(urdf: str, folder: Path, where: str, place: str) -> Path:
+    """Where the file is.
+
+    Args:
+        folder: that `urdf` is relative to, if it is not in example-robot-data.
+        where, place: what the message calls `urdf`, and a file in `folder`.
+    """
     # One rule for the package's files and for users', so that a copy of one of ours works.
-    beside = file.path.parent / file.urdf
-    if beside.is_file():
-        return beside
+    if (folder / urdf).is_file():
+        return folder / urdf
     # The package is files only: it has no module that could be asked where they are.
-    folders = [
-        folder
+    shared = [
+        robots
         for entry in sys.path
-        if (folder := Path(entry, "cmeel.prefix/share/example-robot-data/robots")).is_dir()
+        if (robots := Path(entry, "cmeel.prefix/share/example-robot-data/robots")).is_dir()
     ]
-    for folder in folders:
-        if (folder / file.urdf).is_file():
-            return folder / file.urdf
-    if folders:
-        raise DynacomError(
-            f"{file.path}: urdf must be a file beside this one or in example-robot-data, "
-            f"got '{file.urdf}'"
-        )
+    for robots in shared:
+        if (robots / urdf).is_file():
+            return robots / urdf
+    if shared:
+        raise DynacomError(f"{where} must be {place} or in example-robot-data, got '{urdf}'")
     raise DynacomError(
-        f"{file.path}: urdf '{file.urdf}' is not beside this file, and example-robot-data, which "
-        "may have it, is not installed: pip install dynacom[robots]"
+        f"{where} '{urdf}' is not {place}, and example-robot-data, which may have it, is not "
+        "installed: pip install dynacom[robots]"
     )
 
 
-def _read_urdf(file: RobotFile) -> pin.Model:
+def _make_robot(file: RobotFile, urdf: Path) -> Robot:
+    model = _read_urdf(urdf, file.path)
+    default = _make_default(model, file)
+    _check_layouts(model, file)
+    contacts = {}
+    for entry in file.contacts:
+        where = f"{file.path}: contact '{entry.name}'"
+        frame = _find_frame(model, entry.settings.frame_name, where)
+        if entry.placement is not None:
+            entry.settings.frame_name = _add_frame(model, frame, entry, where)
+        contacts[entry.name] = entry.settings
+    return Robot(file.name, model, contacts, urdf, default, file.joint_layouts)
+
+
+def _read_urdf(urdf: Path, path: Path) -> pin.Model:
     settings = DynaCoMSettings()
-    settings.urdf = str(_find_urdf(file))
+    settings.urdf = str(urdf)
     try:
         return DynaCoM(settings).getModel().copy()
     except ValueError as error:
-        raise DynacomError(f"{file.path}: urdf: {error}") from error
+        raise DynacomError(f"{path}: urdf: {error}") from error
 
 
-def _find_frame(model: pin.Model, entry: ContactEntry, path: Path) -> int:
-    name = entry.settings.frame_name
+def _find_joint(model: pin.Model, name: str, where: str) -> int:
+    # Behind the universe and the free-flyer.
+    for joint in range(2, model.njoints):
+        if model.names[joint] == name and model.nvs[joint] == 1:
+            return joint
+    raise DynacomError(f"{where} must name joints of the URDF that turn or slide, got '{name}'")
+
+
+def _make_default(model: pin.Model, file: RobotFile) -> np.ndarray:
+    step = np.zeros(model.nv)
+    for name, value in file.default.items():
+        joint = _find_joint(model, name, f"{file.path}: default")
+        step[model.idx_vs[joint]] = value
+        # Joints without limits have a sine and a cosine.
+        if model.nqs[joint] == 1:
+            index = model.idx_qs[joint]
+            lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
+            if not lower <= value <= upper:
+                raise DynacomError(
+                    f"{file.path}: default: {name} must be within its limits, {lower:g} to "
+                    f"{upper:g}, got {value:g}"
+                )
+    default = pin.integrate(model, pin.neutral(model), step)
+    default.flags.writeable = False
+    return default
+
+
+def _check_layouts(model: pin.Model, file: RobotFile) -> None:
+    where = f"{file.path}: joint_layouts"
+    lengths = {model.njoints - 2}
+    for layout in file.joint_layouts:
+        for name, count in Counter(layout).items():
+            _find_joint(model, name, where)
+            if count > 1:
+                raise DynacomError(f"{where} must name a joint once, got '{name}' {count} times")
+        # A motion without names is known by how many joints it has.
+        if len(layout) in lengths:
+            raise DynacomError(
+                f"{where} must differ in length from each other and from the robot's "
+                f"{model.njoints - 2} joints, got one of {len(layout)}"
+            )
+        lengths.add(len(layout))
+
+
+def _find_frame(model: pin.Model, name: str, where: str) -> int:
     frames = [index for index, frame in enumerate(model.frames) if frame.name == name]
     if len(frames) != 1:
         raise DynacomError(
-            f"{path}: contact '{entry.name}': frame must be the name of one frame of the URDF, "
-            f"got '{name}', which {len(frames) or 'none'} of them have"
+            f"{where}: frame must be the name of one frame of the URDF, got '{name}', which "
+            f"{len(frames) or 'none'} of them have"
         )
+    if model.frames[frames[0]].parentJoint == 0:
+        raise DynacomError(f"{where}: frame must be the robot's, got the world's, '{name}'")
     return frames[0]
 
 
-def _add_frame(model: pin.Model, parent_id: int, entry: ContactEntry, path: Path) -> str:
+def _add_frame(model: pin.Model, parent_id: int, entry: ContactEntry, where: str) -> str:
     """Adds the contact's own frame to the model; returns its name."""
     name = f"{entry.name}_contact"
     if model.existFrame(name):
         raise DynacomError(
-            f"{path}: contact '{entry.name}': the frame that xyz and rpy place would be called "
-            f"'{name}', which the URDF has already"
+            f"{where}: the frame that xyz and rpy place would be called '{name}', which the URDF "
+            "has already"
         )
     parent = model.frames[parent_id]
     placement = parent.placement * entry.placement

@@ -3,6 +3,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,15 +11,34 @@ import pinocchio as pin
 import pytest
 
 import dynacom
+from dynacom.motion_joints import urdf_order
 from dynacom.robots import Robot
+from helpers import SHARED_DATA
+from motion_files import G1_FILE, TOY_FILE, TOY_URDF
 
 ROOT = Path(__file__).parents[2]
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--pictures",
+        action="store_true",
+        help="keep in docs/ the pictures that tests of pages take",
+    )
 
 
 @pytest.fixture(scope="session")
 def root() -> Path:
     """The repository."""
     return ROOT
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Motions by third parties, which are not part of the repository."""
+    if not SHARED_DATA.is_dir():
+        pytest.skip("the folder ../shared/data is not there")
+    return SHARED_DATA
 
 
 @pytest.fixture(scope="session")
@@ -29,6 +49,29 @@ def talos() -> Robot:
 @pytest.fixture(scope="session")
 def anymal() -> Robot:
     return dynacom.load_robot("anymal_c")
+
+
+@pytest.fixture(scope="session")
+def toy(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    """A small robot with joints of every kind; its toe may be missing in files."""
+    folder = tmp_path_factory.mktemp("toy")
+    (folder / "toy.urdf").write_text(TOY_URDF)
+    (folder / "toy.yaml").write_text(TOY_FILE)
+    robot = dynacom.load_robot(folder / "toy.yaml")
+    default = robot.default.copy()
+    default[robot.model.joints[robot.model.getJointId("b_toe")].idx_q] = 0.25
+    layout = ("z_knee", "m_hip", "c_wheel", "a_slide")
+    return replace(robot, default=default, joint_layouts=(layout,))
+
+
+@pytest.fixture(scope="session")
+def humanoid(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    """Unitree's G1 of 29 joints, whose wrists may be missing in files."""
+    path = tmp_path_factory.mktemp("g1") / "humanoid.yaml"
+    path.write_text(G1_FILE)
+    robot = dynacom.load_robot(path)
+    layout = tuple(name for name in urdf_order(robot) if "wrist" not in name)
+    return replace(robot, joint_layouts=(layout,))
 
 
 def put_on_ground(robot: Robot, q: np.ndarray) -> np.ndarray:

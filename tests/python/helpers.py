@@ -284,3 +284,22 @@ def documentation(function: object) -> list[str]:
     if len(parts) == 1:
         return [doc.strip()]
     return [part.strip().removeprefix(":").strip() for part in parts[1:]]
+
+
+def documented_columns(root: Path, contacts: Sequence[str]) -> dict[str, str]:
+    """The names in docs/columns.md, in its order, with their units as in Parquet's metadata."""
+    text = (root / "docs" / "columns.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`.*?`) \| (.*?) ?\|", text, flags=re.MULTILINE)
+    units = {
+        name: unit.replace("²", "^2").replace("·", " ")
+        for cell, unit in rows
+        for name in re.findall(r"`([^`]+)`", cell)
+    }
+    per_contact = {name: unit for name, unit in units.items() if "<name>" in name}
+    frame = {name: unit for name, unit in units.items() if name not in per_contact}
+    assert list(units) == [*frame, *per_contact]
+    return frame | {
+        name.replace("<name>", contact): unit
+        for contact in contacts
+        for name, unit in per_contact.items()
+    }

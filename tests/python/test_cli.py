@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-2-Clause
 import contextlib
 import csv
+import json
 import os
 import pty
 import re
@@ -10,10 +11,17 @@ import sys
 import time
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 
 import dynacom
-from dynacom import cli, report
+from dynacom import cli
+from dynacom.summary import summary_table
+from helpers import WALKS, documented_columns, robots_folder
+from motion_files import sway, write_columns, write_csv
+
+WALK = WALKS / "talos_walk.npz"
+FILES = ["frames.parquet", "schedule.yaml", "summary.json"]
 
 
 @pytest.fixture
@@ -39,34 +47,13 @@ def refuses(command):
 
     def refuses(*arguments, parts):
         status, out, err = command(*arguments)
-        assert status == 2
+        assert status == 2, (out, err)
         assert out == ""
         assert re.fullmatch(r"dynacom: [^\n]+\n", err)
         for part in parts:
             assert str(part) in err
 
     return refuses
-
-
-def read_csv(path):
-    with path.open(newline="") as file:
-        rows = list(csv.reader(file))
-    return {name: list(column) for name, *column in zip(*rows, strict=True)}
-
-
-def numbers(table, *names):
-    return np.array([[float(value) for value in table[name]] for name in names]).T
-
-
-def documented_columns(root, contacts):
-    """The names in docs/columns.md, in its order."""
-    text = (root / "docs" / "columns.md").read_text()
-    cells = re.findall(r"^\| (`.*?`) \|", text, flags=re.MULTILINE)
-    names = [name for cell in cells for name in re.findall(r"`([^`]+)`", cell)]
-    per_contact = [name for name in names if "<name>" in name]
-    frame = [name for name in names if name not in per_contact]
-    assert names == frame + per_contact
-    return frame + [name.replace("<name>", c) for c in contacts for name in per_contact]
 
 
 # Without a motion.
@@ -103,13 +90,17 @@ def test_help(command):
     status, out, _ = command("analyze", "--help")
     assert status == 0
     assert "[rad/s]" in out
-    for option in ("--robot", "--out", "--flat", "--uneven", "--omega", "--ground-height"):
+    for option in (
+        *("--robot", "--urdf", "--contact", "--payload", "--fps", "--quat", "--trust", "--clip"),
+        *("--schedule", "--cutoff", "--ground-height", "--flat", "--uneven", "--omega"),
+        *("--settings", "--set", "--out", "--csv", "--page", "--no-page", "--check"),
+    ):
         assert option in out
 
 
 @pytest.mark.parametrize(
     "arguments",
-    [[], ["dance"], ["analyze"], ["analyze", "m.npz", "--out", "d"], ["analyze", "--bogus"]],
+    [[], ["dance"], ["analyze"], ["show"], ["analyze", "m.npz", "--bogus"]],
 )
 def test_usage_errors(command, arguments):
     status, _, err = command(*arguments)
@@ -117,289 +108,481 @@ def test_usage_errors(command, arguments):
     assert "Traceback" not in err
 
 
-# frames.csv.
+# Results.
 
 
 @pytest.fixture
 def analyze(command, tmp_path):
-    """Analyses a motion, which must succeed: the columns of frames.csv, and what was printed."""
+    """Analyses a motion, which must succeed: the folder, and what was printed."""
 
     def analyze(motion, *arguments, robot="talos"):
         out = tmp_path / "out"
         status, printed, err = command(
-            "analyze", motion, "--robot", robot, "--out", out, *arguments
+            "analyze", motion, "--robot", robot, "--no-page", "--out", out, *arguments
         )
         assert (status, err) == (0, "")
-        assert os.listdir(out) == ["frames.csv"]
-        return read_csv(out / "frames.csv"), printed
+        return out, printed
 
     return analyze
 
 
-def test_columns_are_those_documented(analyze, motion_file, root):
-    table, _ = analyze(motion_file())
-    assert list(table) == documented_columns(root, ["left_sole", "right_sole"])
-    assert len(table) == 29 + 2 * 7
+def summary(out):
+    return json.loads((out / "summary.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("flat", [True, False])
-def test_values_are_those_of_each_frame(analyze, motion_file, talos, talos_motion, flat):
-    """Every cell, against DynaCoM's own methods, called frame by frame."""
-    arguments = ["--omega", "3.1", "--ground-height", "0.01", "--flat" if flat else "--uneven"]
-    table, _ = analyze(motion_file(), *arguments)
+def cells(printed):
+    """The table's rows: its two columns, the lines of a cell joined."""
+    rows = []
+    for line in printed.splitlines():
+        if line.startswith("│"):
+            left, right = (cell.strip() for cell in line.strip("│").split("│"))
+            if left:
+                rows.append([left, right])
+            else:
+                rows[-1][1] += f" {right}"
+    return [tuple(row) for row in rows]
 
-    columns = {name: [] for name in table}
 
-    def add(name, values, axes="xyz"):
-        for axis, value in zip(axes, values, strict=True):
-            columns[f"{name}_{axis}"].append(value)
+def test_files_are_those_of_the_report(analyze, talos, tmp_path):
+    """The command is dynacom.analyze and save, and no more."""
+    out, printed = analyze(WALK)
+    report = dynacom.analyze(WALK, talos)
+    report.save(tmp_path / "expected", page=False)
+    assert sorted(os.listdir(out)) == FILES
+    for name in FILES:
+        assert (out / name).read_bytes() == (tmp_path / "expected" / name).read_bytes()
+    for name in FILES:
+        assert f"\nWrote {out / name}\n" in printed
 
-    statuses = []
-    for k, t in enumerate(talos_motion["t"]):
-        active = dict(zip(talos_motion["contact_names"], talos_motion["contacts"][k], strict=True))
-        robot = talos.dynacom(inactive=[name for name in active if not active[name]])
-        robot.setGroundHeight(0.01)
-        q, v, a = (talos_motion[name][k] for name in "qva")
-        robot.computeNL(3.1, q, v, a, flatHorizontalGround=flat)
-        force, torque = robot.getGroundCoMForce(), robot.getGroundCoMTorque()
-        statuses.append(str(robot.distributeForce(force, torque, robot.getCoM())))
-        columns["time"].append(t)
-        add("com", robot.getCoM())
-        add("vcom", robot.getVCoM())
-        add("acom", robot.getACoM())
-        add("am", robot.getAM())
-        add("dam", robot.getAMVariation())
-        add("ground_force", force)
-        add("ground_torque", torque)
-        add("cop", robot.getCoP(), "xy")
-        add("vrp", robot.getVRP(), "xy")
-        add("nl", robot.getNL(), "xy")
-        for name in active:
-            contact = robot.getContact(name)
-            columns[f"contact.{name}.active"].append(float(active[name]))
-            add(f"contact.{name}.force", contact.appliedForce()[:3])
-            add(f"contact.{name}.torque", contact.appliedForce()[3:])
 
-    assert table["status"] == statuses
-    assert set(statuses) == {"Solved", "Relaxed", "NoContact"}
-    del columns["status"]
-    for name, values in columns.items():
-        # The order of activation may differ, and the solver's rounding with it.
-        tolerance = 1e-6 if name.startswith("contact") or not flat else 0.0
-        np.testing.assert_allclose(
-            numbers(table, name)[:, 0], values, rtol=tolerance, atol=tolerance, err_msg=name
+def test_csv_when_asked_for(analyze, root, talos):
+    out, printed = analyze(WALK, "--csv")
+    assert sorted(os.listdir(out)) == ["frames.csv", *FILES]
+    assert f"Wrote {out / 'frames.csv'}\n" in printed
+    with (out / "frames.csv").open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header == list(documented_columns(root, talos.contacts))
+    assert len(rows) == 318
+    table = pyarrow.parquet.read_table(out / "frames.parquet")
+    assert table.column_names == header
+    np.testing.assert_array_equal(table["com_x"], [float(row[1]) for row in rows])
+
+
+def test_the_folder_by_default(command, tmp_path, monkeypatch, motion_file):
+    """Beside where one is, named after the clip; clips of other names do not share it."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    for name, folder in (
+        ("walk.npz", "walk-analysis"),
+        ("walk.2.npz", "walk.2-analysis"),
+        (".walk.npz", ".walk-analysis"),
+    ):
+        path = motion_file(name)
+        status, _, _ = command("analyze", path, "--robot", "talos", "--no-page")
+        assert status == 0
+        assert sorted(os.listdir(folder)) == FILES
+    assert len(os.listdir()) == 3
+
+
+def test_the_suffix_of_packed_files_is_left_out(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    robot = dynacom.load_robot("g1")
+    write_csv(tmp_path / "a.clip.csv.gz", sway(robot, 10).table)
+    arguments = ("--robot", "g1", "--fps", "60", "--no-page")
+    assert command("analyze", "a.clip.csv.gz", *arguments)[0] == 0
+    assert sorted(os.listdir()) == ["a.clip-analysis", "a.clip.csv.gz"]
+
+
+def test_other_files_stay(command, motion_file, tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "summary.json").write_text("old")
+    arguments = ("--robot", "talos", "--no-page", "--out", tmp_path)
+    assert command("analyze", motion_file(), *arguments)[0] == 0
+    assert sorted(os.listdir(tmp_path)) == sorted([*FILES, "motion.npz", "notes.txt"])
+    assert summary(tmp_path)["frames"] == 40
+
+
+@pytest.mark.parametrize("name", ["talos_walk", "anymal_walk", "anymal_trot"])
+def test_bundled_motions_are_feasible(analyze, name):
+    """From rest to rest: on average the ground bears the weight, and all contacts together do."""
+    robot = "talos" if name == "talos_walk" else "anymal_c"
+    out, printed = analyze(WALKS / f"{name}.npz", "--check", robot=robot)
+    found = summary(out)
+    assert found["verdict"] == "feasible"
+    assert found["mean_vertical_force"] == pytest.approx(1.0, abs=0.01)
+    shares = [contact["weight_share"] for contact in found["contacts"].values()]
+    assert sum(shares) == pytest.approx(1.0, abs=0.01)
+    assert ("Verdict", "feasible") in cells(printed)
+
+
+# The exit status.
+
+
+def test_check(command, tmp_path):
+    """1 is for a verdict that is not feasible, and only where it is asked for."""
+    arguments = ["analyze", WALK, "--robot", "talos", "--no-page", "--out", tmp_path]
+    assert command(*arguments, "--check")[0] == 0
+    strict = [*arguments, "--set", "verdict.foot_sliding.limit=1e-5"]
+    assert command(*strict)[0] == 0
+    status, printed, err = command(*strict, "--check")
+    assert (status, err) == (1, "")
+    assert ("Verdict", "not feasible") in cells(printed)
+    assert sorted(os.listdir(tmp_path)) == FILES
+    assert summary(tmp_path)["codes"] == ["foot_sliding"]
+
+
+# Options.
+
+
+def test_schedules(analyze, tmp_path):
+    """That which was found is written, may be corrected, and is read again."""
+    with np.load(WALK) as file:
+        arrays = {name: file[name] for name in ("t", "q", "v", "a")}
+    np.savez(tmp_path / "bare.npz", **arrays)
+    out, _ = analyze(tmp_path / "bare.npz")
+    expected = summary(out)
+    assert "Contacts are found from height and speed." in expected["notes"]
+    table = (out / "frames.parquet").read_bytes()
+    path = tmp_path / "mine.yaml"
+    path.write_text((out / "schedule.yaml").read_text())
+    analyze(tmp_path / "bare.npz", "--schedule", path)
+    again = summary(out)
+    assert f"Contacts are active as {path} says." in again["notes"]
+    assert again | {"notes": []} == expected | {"notes": []}
+    assert (out / "frames.parquet").read_bytes() == table
+    path.write_text("left_sole: [[0, 1]]\n")
+    analyze(tmp_path / "bare.npz", "--schedule", path)
+    assert summary(out)["contacts"]["left_sole"]["active_share"] == pytest.approx(51 / 318)
+    assert summary(out)["contacts"]["right_sole"]["active_share"] == 0.0
+
+
+def test_settings(analyze, tmp_path):
+    """From a file, then from texts, then from options of their own, which count the most."""
+    path = tmp_path / "settings.yaml"
+    path.write_text("cutoff: 3\nomega: 1\nverdict: {near_ground: 0.1, quaternion: {limit: 0.2}}\n")
+    out, _ = analyze(
+        WALK,
+        *("--settings", path),
+        *("--set", "omega=2", "--set", "detection.height=0.02"),
+        *("--set", "verdict.near_ground=0.2"),
+        *("--omega", "3", "--ground-height", "-0.5", "--uneven"),
+    )
+    options = summary(out)["options"]
+    assert (options["cutoff"], options["omega"], options["flat"]) == (3.0, 3.0, False)
+    assert options["detection"]["height"] == 0.02
+    assert options["detection"]["ground_height"] == -0.5
+    assert options["verdict"]["near_ground"] == 0.2
+    assert options["verdict"]["quaternion"] == {"limit": 0.2, "allowed_share": 0.0}
+    assert summary(out)["omega"] == 3.0
+    assert summary(out)["ground"] == {"left_sole": -0.5, "right_sole": -0.5}
+
+
+def test_settings_left_alone(analyze):
+    out, _ = analyze(WALK)
+    assert summary(out)["options"] == dynacom.AnalysisOptions().to_dict()
+
+
+def test_flat_overrules_a_file(analyze, tmp_path):
+    path = tmp_path / "settings.yaml"
+    path.write_text("flat: false\n")
+    for arguments, flat in (([], False), (["--flat"], True)):
+        out, _ = analyze(WALK, "--settings", path, *arguments)
+        assert summary(out)["options"]["flat"] is flat
+
+
+@pytest.mark.parametrize(("given", "cutoff"), [("7.5", 7.5), ("0", None)])
+def test_the_cut_off(analyze, tmp_path, given, cutoff):
+    with np.load(WALK) as file:
+        np.savez(tmp_path / "bare.npz", t=file["t"], q=file["q"])
+    out, printed = analyze(tmp_path / "bare.npz", "--cutoff", given)
+    found = summary(out)
+    assert found["cutoff"] == found["options"]["cutoff"] == cutoff
+    titles = [title for title, _ in cells(printed) if title.startswith("Residual at")]
+    assert titles == ([f"Residual at {x} Hz" for x in ("3.75", "7.5", "15")] if cutoff else [])
+
+
+def test_how_a_file_is_read(analyze, tmp_path):
+    """--fps and --quat, as in read_motion."""
+    robot = dynacom.load_robot("g1")
+    table = sway(robot, 30).table
+    table[:, 3:7] = table[:, [6, 3, 4, 5]]
+    path = write_csv(tmp_path / "clip.csv", table)
+    out, _ = analyze(path, "--fps", "50", "--quat", "wxyz", robot="g1")
+    assert summary(out)["frame_rate"] == pytest.approx(50.0)
+    assert summary(out)["frames"] == 30
+
+
+def test_pickles(analyze, shared_data, refuses, tmp_path):
+    path = shared_data / "squat_level1.pkl"
+    out = tmp_path / "out"
+    arguments = ("--robot", "g1", "--no-page", "--out", out)
+    refuses("analyze", path, *arguments, parts=["joblib", "--trust"])
+    assert not out.exists()
+    analyze(path, "--trust", robot="g1")
+    assert summary(out)["frames"] == 158
+
+
+def test_a_clip_of_several(analyze, refuses, tmp_path):
+    import pickle
+
+    robot = dynacom.load_robot("g1")
+    clips = {}
+    for name, frames in (("walk", 20), ("run", 30)):
+        motion = sway(robot, frames)
+        clips[name] = {
+            "root_trans_offset": motion.position,
+            "root_rot": motion.quaternion,
+            "dof": motion.angles,
+            "fps": 60,
+        }
+    path = tmp_path / "clips.pkl"
+    path.write_bytes(pickle.dumps(clips))
+    out, _ = analyze(path, "--clip", "run", robot="g1")
+    assert summary(out)["frames"] == 30
+    arguments = ("analyze", path, "--robot", "g1", "--no-page", "--out", tmp_path / "other")
+    refuses(*arguments, parts=[path, "--clip", "walk, run"])
+    refuses(*arguments, "--clip", "jump", parts=[path, "jump"])
+
+
+def test_payloads(analyze, talos):
+    """As many as there are."""
+    payloads = ("--payload", "torso_2_link:12@0.1,0,0.2", "--payload", "gripper_left_base_link:1")
+    out, _ = analyze(WALK, *payloads)
+    mass = talos.dynacom().getMass()
+    assert summary(out)["mass"] == pytest.approx(mass + 13.0)
+    assert summary(out)["mean_vertical_force"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_robot_without_a_file(command, tmp_path, talos):
+    urdf = robots_folder() / "talos_data/robots/talos_reduced.urdf"
+    contacts = [
+        f"{side}_sole_link:6d:name={side}_sole,half_length=0.1,half_width=0.06,mu=0.7,gu=0.08"
+        for side in ("left", "right")
+    ]
+    arguments = [part for contact in contacts for part in ("--contact", contact)]
+    out = tmp_path / "out"
+    status, _, err = command(
+        "analyze", WALK, "--urdf", urdf, *arguments, "--no-page", "--check", "--out", out
+    )
+    assert (status, err) == (0, "")
+    expected = dynacom.analyze(WALK, talos).summary
+    assert summary(out) | {"robot": "talos"} == expected
+
+
+# The summary that is printed.
+
+
+def test_what_is_printed(analyze, motion_file, talos):
+    limits = (f"verdict.{code}.limit=0" for code in ("foot_sliding", "discontinuity"))
+    out, printed = analyze(motion_file(), *(part for text in limits for part in ("--set", text)))
+    rows, found = cells(printed), summary(out)
+    assert rows[0] == ("Verdict", "not feasible")
+    reasons = [entry for entry in found["reasons"] if entry["holds"]]
+    assert len(reasons) >= 2
+    assert rows[1 : 1 + len(reasons)] == [(entry["code"], entry["text"]) for entry in reasons]
+    table = dict(rows)
+    assert table["Motion"] == "0.780 s, 40 frames at 50 Hz"
+    for status, count in found["statuses"].items():
+        assert table[status] == f"{count} ({count / 40:.1%})"
+    assert table["Mass"] == f"{talos.dynacom().getMass():.3f} kg"
+    mean, change = found["mean_vertical_force"], found["momentum_change"]
+    assert table["Mean vertical force"].startswith(f"{mean:.1%} of the weight")
+    assert abs(change) > 0.0005
+    assert table["Mean vertical force"].endswith(f"of which {change:+.1%} ends in momentum")
+    for name in ("left_sole", "right_sole"):
+        contact = found["contacts"][name]
+        assert table[f"Weight on {name}"] == (
+            f"{contact['weight_share']:.1%} ({contact['weight_share_while_active']:.1%} while "
+            f"active, in {contact['active_share']:.1%} of the frames)"
         )
+    assert [text for title, text in rows if title == "Note"] == found["notes"]
+    assert [line for line in printed.splitlines() if line.startswith("Wrote ")] == [
+        f"Wrote {out / name}" for name in FILES
+    ]
 
 
-def test_numbers_read_back_exactly(analyze, motion_file, talos):
-    path = motion_file()
-    table, _ = analyze(path)
-    motion, schedule, _ = dynacom.read_motion(path)
-    analysis = dynacom.analyzeMotion(talos.dynacom(), motion, schedule)
-    names = [f"ground_force_{axis}" for axis in "xyz"]
-    np.testing.assert_array_equal(numbers(table, *names), analysis.ground_force)
-    names = [f"contact.right_sole.torque_{axis}" for axis in "xyz"]
-    np.testing.assert_array_equal(numbers(table, *names), analysis.contacts[1].wrench[:, 3:])
+def test_measured_forces_and_contacts_that_are_never_active_are_printed(analyze, tmp_path):
+    path = tmp_path / "schedule.yaml"
+    path.write_text("left_sole: [[0, 9]]\n")
+    out, printed = analyze(WALK, "--schedule", path)
+    table = dict(cells(printed))
+    assert table["Weight on right_sole"] == "0.0% (never active)"
+    for name, compared in summary(out)["measured"].items():
+        bias, rms = compared["bias"][2], compared["rms"][2]
+        assert table[f"Measured on {name}"] == f"f_z differs by {bias:.3g} N, {rms:.3g} N RMS"
 
 
-def test_nan_where_there_is_no_number(analyze, motion_file, talos_motion):
-    """The last frame is free fall, in which nothing presses anywhere."""
-    table, _ = analyze(motion_file())
-    for name in ("cop_x", "cop_y", "nl_x", "nl_y"):
-        assert table[name][-1] == "nan"
-        assert "nan" not in table[name][:-1]
-    assert "nan" not in table["vrp_x"]
-    assert float(table["ground_force_z"][-1]) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_points_have_no_torque(analyze, motion_file, anymal, anymal_standing):
-    frames = 3
-    zeros = np.zeros((frames, anymal.model.nv))
-    path = motion_file(
-        t=np.arange(frames),
-        q=np.tile(anymal_standing, (frames, 1)),
-        v=zeros,
-        a=zeros,
-        contacts=np.ones((frames, 4), dtype=bool),
-        contact_names=np.array(["RH_FOOT", "LH_FOOT", "RF_FOOT", "LF_FOOT"]),
-    )
-    table, _ = analyze(path, robot="anymal_c")
-    feet = [name.split(".")[1] for name in table if name.endswith(".active")]
-    assert feet == list(anymal.contacts)
-    assert set(table["status"]) == {"Solved"}
-    for foot in feet:
-        assert numbers(table, f"contact.{foot}.force_z").min() > 100.0
-        assert not numbers(table, *(f"contact.{foot}.torque_{axis}" for axis in "xyz")).any()
-
-
-def test_a_single_frame(analyze, motion_file, talos_motion, talos):
-    first = {name: talos_motion[name][:1] for name in ("t", "q", "v", "a", "contacts")}
-    table, _ = analyze(motion_file(**first))
-    assert table["status"] == ["Solved"]
-    borne = float(table["contact.left_sole.force_z"][0]) + float(
-        table["contact.right_sole.force_z"][0]
-    )
-    assert borne == pytest.approx(9.81 * talos.dynacom().getMass(), rel=0.05)
-
-
-def test_contacts_without_schedule_stay_inactive(analyze, motion_file, talos_motion):
-    path = motion_file(
-        contacts=talos_motion["contacts"][:, :1], contact_names=np.array(["left_sole"])
-    )
-    table, _ = analyze(path)
-    assert set(table["contact.right_sole.active"]) == {"0"}
-
-
-def test_omega_of_the_mean_height_by_default(analyze, motion_file):
-    table, _ = analyze(motion_file(), "--ground-height", "0.1")
-    com, acom = numbers(table, "com_x", "com_y"), numbers(table, "acom_x", "acom_y")
-    omega2 = 9.81 / (numbers(table, "com_z").mean() - 0.1)
-    np.testing.assert_allclose(numbers(table, "vrp_x", "vrp_y"), com - acom / omega2, rtol=1e-12)
-
-
-def test_names_that_csv_must_quote(analyze, motion_file, tmp_path):
+def test_names_are_not_taken_for_markup(analyze, motion_file, tmp_path):
     robot = tmp_path / "odd.yaml"
     text = next(p for p in dynacom.robots.list_robots() if p.stem == "talos").read_text()
     name = 'left, "[b]sole"'
     robot.write_text(text.replace("left_sole\n", f"'{name}'\n"))
-    path = motion_file(contact_names=np.array([name, "right_sole"]))
-    table, printed = analyze(path, robot=robot)
-    assert f"contact.{name}.force_z" in table
-    assert f"Weight on {name}" in printed
+    path = motion_file("[red]clip.npz", contact_names=np.array([name, "right_sole"]))
+    out, printed = analyze(path, robot=robot)
+    assert f"Weight on {name}" in dict(cells(printed))
+    assert name in summary(out)["contacts"]
+    assert summary(out)["clip"] == "[red]clip.npz"
 
 
-# The summary.
-
-
-def test_summary(analyze, motion_file, talos, talos_motion):
-    _, printed = analyze(motion_file())
-    text = re.sub(r"[│┃|]+", " ", printed)
-
-    def row(title):
-        return re.search(rf"{title} +(.*?) *$", text, flags=re.MULTILINE).group(1)
-
-    assert row("Duration") == "0.780 s"
-    assert row("Frames") == "40"
-    # The foot that it stands on is not below its centre of mass; a free fall asks for nothing.
-    assert row("Solved") == "26 (65.0%)"
-    assert row("Relaxed") == "5 (12.5%)"
-    assert row("NoContact") == "9 (22.5%)"
-    assert row("Mass") == f"{talos.dynacom().getMass():.3f} kg"
-    assert re.fullmatch(r"\S+ N at 0\.\d{3} s", row("Largest residual"))
-    assert re.fullmatch(r"-?0\.\d{4} to -?0\.\d{4} m", row("CoP range, x"))
-    assert re.search(r"in 75\.0% of the frames\)", row("Weight on left_sole"))
-    assert re.search(r"in 62\.5% of the frames\)", row("Weight on right_sole"))
-    assert re.search(r"^Wrote .*out/frames\.csv$", printed, flags=re.MULTILINE)
-
-
-class Fake:
-    """Stands for an analysis with round numbers."""
-
-    class Contact:
-        def __init__(self, name, active, vertical_force):
-            self.name = name
-            self.active = np.array(active, dtype=bool)
-            self.vertical_force = np.array(vertical_force, dtype=float)
-
-    time = np.array([1.0, 1.5, 2.0, 3.0])
-    status = [
-        dynacom.DistributionStatus.Solved,
-        dynacom.DistributionStatus.Relaxed,
-        dynacom.DistributionStatus.Solved,
-        dynacom.DistributionStatus.NoContact,
-    ]
-    residual = np.array(
-        [[0, 0, 0, 0, 0, 0], [3, 4, 0, 0, 0, 1], [0, 0, 0, 0, 0, 0], [0, 0, 1, 0, 3, 4]],
-        dtype=float,
+def test_a_table_of_next_to_nothing(talos):
+    """One frame, in which nothing is known of time."""
+    with np.load(WALK) as file:
+        q = file["q"][:1]
+    clip = dynacom.Clip(
+        WALK, np.zeros(1), q, None, None, (), None, {}, np.zeros(1), ("[b]A note[/b].",)
     )
-    cop = np.array([[0.1, -0.2], [np.nan, np.nan], [-0.3, 0.4], [0.0, 0.0]])
-    contacts = [
-        Contact("a", [1, 1, 0, 0], [100, 50, 0, 0]),
-        Contact("b", [0, 0, 0, 0], [0, 0, 0, 0]),
-    ]
+    table = summary_table(dynacom.analyze(clip, talos).summary)
+    left, right = (list(column.cells) for column in table.columns)
+    assert right[left.index("Motion")] == "0.000 s, 1 frames"
+    assert right[left.index("Note")] == r"\[b]A note\[/b]."
 
 
-def test_summary_by_hand():
-    summary = report.summarize(Fake(), mass=10.0, gravity=10.0)
-    assert summary.frames == 4
-    assert summary.duration == 2.0
-    assert summary.statuses == {"Solved": 2, "Relaxed": 1, "NoContact": 1}
-    assert summary.residual_force == report.Peak(5.0, 1.5)
-    assert summary.residual_torque == report.Peak(5.0, 3.0)
-    np.testing.assert_array_equal(summary.cop_range, [[-0.3, 0.1], [-0.2, 0.4]])
-    assert summary.shares[0] == report.ContactShare("a", 0.375, 0.75, 0.5)
-    assert summary.shares[1].overall == 0.0
-    assert np.isnan(summary.shares[1].while_active)
+# Bad input: one line on stderr, status 2, and no folder.
 
 
-def test_summary_of_nothing():
-    """Nowhere a CoP, no gravity: NaN, and no warnings or errors."""
-    fake = Fake()
-    fake.cop = np.full((4, 2), np.nan)
-    fake.residual = np.full((4, 6), np.nan)
-    summary = report.summarize(fake, mass=10.0, gravity=0.0)
-    assert np.isnan(summary.cop_range).all()
-    assert np.isnan(summary.residual_force.value)
-    assert np.isnan(summary.shares[0].overall)
-    report.summary_table(summary)
+@pytest.fixture
+def refuses_clip(refuses, tmp_path):
+    """Expects that a clip is refused, and nothing written."""
+
+    def refuses_clip(path, *arguments, parts, robot="g1"):
+        out = tmp_path / "out"
+        options = [*(("--robot", robot) if robot else ()), "--no-page", "--out", out]
+        refuses("analyze", path, *options, *arguments, parts=parts)
+        assert not out.exists()
+
+    return refuses_clip
 
 
-# Bad input.
+@pytest.fixture(scope="module")
+def clip():
+    return sway(dynacom.load_robot("g1"), 60)
 
 
-def test_bad_robots(refuses, motion_file, tmp_path):
-    path, out = motion_file(), tmp_path / "out"
-    options = ("--out", out, "--robot")
-    refuses("analyze", path, *options, "talso", parts=["talos", "'talso'"])
+def test_another_robot(refuses_clip, clip, tmp_path):
+    path = write_csv(tmp_path / "clip.csv", clip.table)
+    refuses_clip(path, "--fps", 60, robot="talos", parts=[path, "32 of the joints of talos", "36"])
+    path = write_columns(tmp_path / "named.csv", clip.columns)
+    refuses_clip(path, robot="talos", parts=[path, "joints of talos", "left_hip_pitch_joint"])
+    refuses_clip(WALK, parts=[WALK, "q must have"])
+
+
+def test_another_order_of_quaternions(refuses_clip, clip, tmp_path):
+    table = clip.table.copy()
+    table[:, 3:7] = table[:, [6, 3, 4, 5]]
+    path = write_csv(tmp_path / "clip.csv", table)
+    refuses_clip(path, "--fps", 60, parts=[path, "x y z w", "w x y z", "--quat wxyz"])
+    table[:, 3:7] *= 2.0
+    path = write_csv(tmp_path / "clip.csv", table)
+    refuses_clip(path, "--fps", 60, parts=[path, "norm"])
+
+
+def test_degrees(refuses_clip, clip, tmp_path):
+    table = clip.table.copy()
+    table[:, 7:] = np.rad2deg(table[:, 7:])
+    path = write_csv(tmp_path / "clip.csv", table)
+    refuses_clip(path, "--fps", 60, parts=[path, "degrees"])
+
+
+def test_a_hole_in_time(refuses_clip, clip, tmp_path):
+    columns = clip.columns
+    columns["t"] = columns["t"] + np.where(np.arange(60) >= 20, 0.1, 0.0)
+    path = write_columns(tmp_path / "clip.csv", columns)
+    refuses_clip(path, parts=[path, "time must have no holes", "between frame 19 "])
+    columns["t"][30] = columns["t"][29]
+    path = write_columns(tmp_path / "clip.csv", columns)
+    refuses_clip(path, parts=[path, "time must increase", "frame 30"])
+
+
+def test_a_jump(refuses_clip, clip, tmp_path):
+    table = clip.table.copy()
+    table[40:, 0] += 1.0
+    path = write_csv(tmp_path / "clip.csv", table)
+    refuses_clip(path, "--fps", 60, parts=[path, "the root jumps", "between frame 39 ", "m/s"])
+
+
+def test_frame_rates(refuses_clip, clip, tmp_path):
+    path = write_csv(tmp_path / "clip.csv", clip.table)
+    refuses_clip(path, parts=[path, "give --fps"])
+    refuses_clip(path, "--fps", 0, parts=["fps must be finite and > 0 Hz, got 0"])
+
+
+def test_numbers_that_are_none(refuses_clip, clip, tmp_path):
+    table = clip.table.copy()
+    table[5, 9] = np.nan
+    path = write_csv(tmp_path / "clip.csv", table)
+    refuses_clip(path, "--fps", 60, parts=[path, "must be finite", "frame 5"])
+
+
+def test_files_that_are_none(refuses_clip, tmp_path):
+    refuses_clip(tmp_path / "none.csv", parts=["none.csv: cannot be read", "No such file"])
+    refuses_clip(tmp_path / "clip.bvh", parts=["clip.bvh", "must end in one of .csv"])
+    refuses_clip(tmp_path, parts=[tmp_path, "Is a directory"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["--cutoff", "24"], ["clip.csv", "cutoff must be > 0 and < 24 Hz", "0.4 of the frame"]),
+        (["--cutoff", "-1"], ["cutoff must be finite and > 0 Hz, or none, got -1"]),
+        (["--set", "cutoff=30"], ["clip.csv", "cutoff must be", "got 30 Hz"]),
+        (["--set", "speed=3"], ["setting 'speed=3'", "unknown setting 'speed'", "cutoff, omega"]),
+        (["--set", "omega"], ["setting must be NAME=VALUE, got 'omega'"]),
+        (["--set", "omega=fast"], ["omega must be a finite number, got 'fast'"]),
+        (["--set", "verdict.quaternion.limit=-1"], ["quaternion.limit must be", "got -1"]),
+        (["--omega", "-1"], ["omega must be finite and >= 0 rad/s, got -1"]),
+        (["--omega", "nan"], ["omega must be a finite number, got nan"]),
+        (["--ground-height", "inf"], ["ground_height must be a finite number", "got inf"]),
+        (["--settings", "none.yaml"], ["none.yaml: cannot be read (No such file"]),
+        (["--settings", "bad.yaml"], ["bad.yaml: unknown setting 'left_sole'"]),
+        (["--schedule", "none.yaml"], ["none.yaml: cannot be read (No such file"]),
+        (["--schedule", "bad.yaml"], ["bad.yaml: contact 'left_sole'", "got [3, 1]"]),
+        (["--contact", "a:point:mu=1"], ["--contact goes with --urdf"]),
+        (["--urdf", "r.urdf"], ["--robot, or by --urdf and --contact"]),
+        (["--payload", "left_hand"], ["FRAME:MASS", "got 'left_hand'"]),
+        (["--payload", "tail:1"], ["frame", "got 'tail'"]),
+        (["--payload", "torso_link:-1"], ["mass must be positive and finite, got -1"]),
+        (["--quat", "zyx"], ["quat must be xyzw or wxyz, got 'zyx'"]),
+    ],
+)
+def test_bad_options(refuses_clip, clip, tmp_path, monkeypatch, arguments, parts):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.yaml").write_text("left_sole: [[3, 1]]\n")
+    path = write_csv(tmp_path / "clip.csv", clip.table)
+    refuses_clip(path, "--fps", 60, *arguments, parts=parts)
+
+
+def test_robots_that_are_none(refuses_clip, tmp_path):
+    refuses_clip(WALK, robot="talso", parts=["robot must be one of", "talos", "'talso'"])
     missing = tmp_path / "none.yaml"
-    refuses("analyze", path, *options, missing, parts=[missing, "No such file"])
+    refuses_clip(WALK, robot=missing, parts=[missing, "No such file"])
     bad = tmp_path / "bad.yaml"
     bad.write_text("urdf: 3\ncontacts: []\n")
-    refuses("analyze", path, *options, bad, parts=[bad, "urdf must be"])
-    assert not out.exists()
+    refuses_clip(WALK, robot=bad, parts=[bad, "urdf must be"])
+    refuses_clip(WALK, robot=None, parts=["--robot, or by --urdf and --contact"])
+    urdf = robots_folder() / "talos_data/robots/talos_reduced.urdf"
+    refuses_clip(WALK, "--urdf", urdf, robot=None, parts=["contacts must be given, got none"])
+    contact = ("--contact", "left_sole_link:7d:mu=1")
+    refuses_clip(WALK, "--urdf", urdf, *contact, robot=None, parts=["kind must be point or 6d"])
+    refuses_clip(
+        WALK,
+        *("--urdf", tmp_path / "none.urdf", "--contact", "a:point:mu=1"),
+        robot=None,
+        parts=["none.urdf"],
+    )
 
 
-@pytest.mark.parametrize(
-    ("changes", "part"),
-    [
-        ({"q": None}, "missing array 'q'"),
-        (
-            {"contacts": None, "contact_names": None},
-            "missing arrays 'contacts' and 'contact_names'",
-        ),
-        ({"t": np.zeros(40)}, "time must increase"),
-        ({"q": np.zeros((40, 7))}, "q must have 39"),
-        ({"v": np.full((40, 38), np.nan)}, "v must be finite"),
-        ({"contact_names": np.array(["left_sole", "hand"])}, "'hand'"),
-        ({"contacts": np.ones((39, 2), dtype=bool)}, "got 39"),
-    ],
-)
-def test_bad_motions(refuses, motion_file, tmp_path, changes, part):
-    path, out = motion_file(**changes), tmp_path / "out"
-    refuses("analyze", path, "--robot", "talos", "--out", out, parts=[path, part])
-    assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("option", "value", "part"),
-    [
-        ("--omega", "-1", "omega must be"),
-        ("--omega", "nan", "omega must be"),
-        ("--ground-height", "inf", "groundHeight must be finite"),
-    ],
-)
-def test_bad_settings(refuses, motion_file, tmp_path, option, value, part):
-    out = tmp_path / "out"
-    arguments = ("analyze", motion_file(), "--robot", "talos", "--out", out)
-    refuses(*arguments, option, value, parts=[part])
+@pytest.mark.parametrize("command_name", ["analyze", "show"])
+def test_both_commands_refuse_the_same(refuses, command_name, tmp_path):
+    refuses(command_name, WALK, parts=["--robot, or by --urdf and --contact"])
+    refuses(command_name, tmp_path / "none.npz", "--robot", "talos", parts=["cannot be read"])
 
 
 def test_unwritable_folders(refuses, motion_file, tmp_path):
     file = tmp_path / "file"
     file.write_text("mine")
-    arguments = ("analyze", motion_file(), "--robot", "talos", "--out")
-    refuses(*arguments, file, parts=[file, "exists"])
-    refuses(*arguments, file / "out", parts=[file, "Not a directory"])
+    arguments = ("analyze", motion_file(), "--robot", "talos", "--no-page", "--out")
+    refuses(*arguments, file, parts=[file, "cannot be written (File exists)"])
+    refuses(*arguments, file / "out", parts=[file, "cannot be written (Not a directory)"])
     if os.geteuid() != 0:
         locked = tmp_path / "locked"
         locked.mkdir(mode=0o500)
@@ -423,86 +606,72 @@ def test_no_traceback_in_a_process_of_its_own(run, tmp_path):
     assert re.fullmatch(r"dynacom: [^\n]*none\.npz: cannot be read[^\n]*\n", done.stderr)
 
 
-# Results appear whole or not at all.
+# Ctrl-C.
 
 
-def test_existing_folder(analyze, motion_file, tmp_path, command):
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "frames.csv").write_text("old")
-    table, _ = analyze(motion_file())
-    assert len(table["time"]) == 40
-
-
-def test_other_files_stay(command, motion_file, tmp_path):
-    (tmp_path / "notes.txt").write_text("mine")
-    status, _, _ = command("analyze", motion_file(), "--robot", "talos", "--out", tmp_path)
-    assert status == 0
-    assert sorted(os.listdir(tmp_path)) == ["frames.csv", "motion.npz", "notes.txt"]
-
-
-def test_nested_folders_are_made(command, motion_file, tmp_path):
-    out = tmp_path / "a" / "b"
-    assert command("analyze", motion_file(), "--robot", "talos", "--out", out)[0] == 0
-    assert (out / "frames.csv").exists()
-    umask = os.umask(0)
-    os.umask(umask)
-    assert (out / "frames.csv").stat().st_mode & 0o777 == 0o666 & ~umask
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
-@pytest.mark.parametrize("existed", [True, False])
-def test_interrupted_writing_leaves_everything_as_it_was(tmp_path, error, existed):
-    out = tmp_path / "out"
-    if existed:
-        out.mkdir()
-        (out / "frames.csv").write_text("old")
-    with (
-        pytest.raises(error if isinstance(error, type) else OSError),
-        report.results_folder(out) as folder,
-    ):
-        (folder / "frames.csv").write_text("half")
-        raise error
-    assert out.exists() == existed
-    if existed:
-        assert os.listdir(out) == ["frames.csv"]
-        assert (out / "frames.csv").read_text() == "old"
-
-
-def test_interrupted_analysis_leaves_nothing(command, motion_file, tmp_path, monkeypatch):
-    def interrupt(done):
+def test_an_interrupted_analysis_leaves_nothing(command, motion_file, tmp_path, monkeypatch):
+    def interrupt(part):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "_progress", lambda total: contextlib.nullcontext(interrupt))
+    monkeypatch.setattr(cli, "_progress", lambda: contextlib.nullcontext(interrupt))
     out = tmp_path / "out"
     status, printed, err = command("analyze", motion_file(), "--robot", "talos", "--out", out)
-    assert status not in (0, 2)
+    assert status not in (0, 1, 2)
     assert printed == ""
     assert "Traceback" not in err
     assert not out.exists()
 
 
-def test_ctrl_c_while_writing(tmp_path, talos_motion, motion_file):
-    repeat = 2000
-    arrays = {
-        name: np.tile(talos_motion[name], (repeat, 1)) for name in ("q", "v", "a", "contacts")
-    }
-    path = motion_file(t=np.arange(len(arrays["q"])), **arrays)
-    out = tmp_path / "out"
-    process = subprocess.Popen(
-        [sys.executable, "-m", "dynacom", "analyze", path, "--robot", "talos", "--out", out],
-        stderr=subprocess.PIPE,
-        text=True,
+@pytest.fixture
+def long_motion(motion_file, talos_motion):
+    """Of 40000 frames, which take a while."""
+    arrays = {name: np.tile(talos_motion[name], (1000, 1)) for name in ("q", "v", "a", "contacts")}
+    return motion_file(t=0.01 * np.arange(40000), **arrays)
+
+
+def start(motion, out, **options):
+    return subprocess.Popen(
+        [
+            *(sys.executable, "-m", "dynacom", "analyze", motion, "--robot", "talos"),
+            *("--no-page", "--csv", "--set", "verdict.discontinuity.limit=9", "--out", out),
+        ],
+        stdout=subprocess.PIPE,
         # Where the tests run in the background of a shell, they and their children ignore it.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        **options,
     )
+
+
+def test_ctrl_c_while_analysing(tmp_path, long_motion):
+    out = tmp_path / "out"
+    terminal, process_end = pty.openpty()
+    process = start(long_motion, out, stderr=process_end, env=os.environ | {"TERM": "xterm"})
+    os.close(process_end)
+    shown = b""
+    while b"Analysing" not in shown:
+        shown += os.read(terminal, 1 << 16)
+    process.send_signal(signal.SIGINT)
+    with contextlib.suppress(OSError):  # what a terminal says when the other end is closed
+        while more := os.read(terminal, 1 << 16):
+            shown += more
+    printed, _ = process.communicate(timeout=60)
+    os.close(terminal)
+    assert process.returncode not in (0, 1, 2)
+    assert printed == b""
+    assert b"Traceback" not in shown
+    assert not out.exists()
+
+
+def test_ctrl_c_while_writing(tmp_path, long_motion):
+    out = tmp_path / "out"
+    process = start(long_motion, out, stderr=subprocess.PIPE)
     deadline = time.monotonic() + 60
     while not out.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
+        time.sleep(0.001)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
-    assert process.returncode not in (0, 2)
-    assert "Traceback" not in err
+    assert process.returncode not in (0, 1, 2)
+    assert b"Traceback" not in err
     assert not out.exists()
 
 
@@ -510,8 +679,8 @@ def test_ctrl_c_while_writing(tmp_path, talos_motion, motion_file):
 
 
 def test_progress_on_a_terminal_only(motion_file, tmp_path, run):
-    path = motion_file()
-    arguments = ["analyze", str(path), "--robot", "talos", "--out", str(tmp_path / "out")]
+    arguments = ["analyze", str(motion_file()), "--robot", "talos", "--no-page"]
+    arguments += ["--out", str(tmp_path / "out")]
     assert run(*arguments).stderr == ""
 
     terminal, process_end = pty.openpty()
@@ -527,33 +696,34 @@ def test_progress_on_a_terminal_only(motion_file, tmp_path, run):
     os.close(terminal)
     assert done.returncode == 0
     assert "Analysing" in shown
-    assert "40/40" in shown
-    assert "frames/s" in shown
+    assert "100%" in shown
+    assert re.search(r"\d:\d\d:\d\d", shown)  # the time left
+    assert b"Verdict" in done.stdout
 
 
-# The bundled walks.
+def test_the_page_is_written_unless_it_is_not_wanted(command, motion_file, tmp_path):
+    status, printed, err = command(
+        "analyze", motion_file(), "--robot", "talos", "--out", tmp_path / "out"
+    )
+    assert (status, err) == (0, "")
+    assert f"Wrote {tmp_path / 'out' / 'report.html'}" in printed.splitlines()
+    assert (tmp_path / "out" / "report.html").read_text("utf-8").startswith("<!DOCTYPE html>")
 
 
-@pytest.mark.parametrize(("walk", "robot"), [("talos_walk", "talos"), ("anymal_walk", "anymal_c")])
-def test_bundled_walks(analyze, root, walk, robot):
-    """From rest to rest: on average the ground bears the weight, and all contacts together do."""
-    path = root / "examples" / "data" / f"{walk}.npz"
-    table, _ = analyze(path, robot=robot)
-    motion, schedule, _ = dynacom.read_motion(path)
-    assert len(table["time"]) == motion.frames
-    subject = dynacom.load_robot(robot)
-    weight = 9.81 * subject.dynacom().getMass()
-    assert numbers(table, "ground_force_z").mean() == pytest.approx(weight, rel=0.01)
+# The viewer.
 
-    # They were planned within these cones.
-    assert set(table["status"]) == {"Solved"}
-    active = numbers(table, *(f"contact.{name}.active" for name in schedule.names))
-    np.testing.assert_array_equal(active, schedule.active)
 
-    # What each contact bears, in the world, adds up to what the ground must give.
-    analysis = dynacom.analyzeMotion(subject.dynacom(), motion, schedule)
-    borne = sum(contact.vertical_force for contact in analysis.contacts)
-    np.testing.assert_allclose(borne, analysis.ground_force[:, 2], rtol=1e-6)
-    summary = report.summarize(analysis, weight / 9.81, 9.81)
-    shares = sum(share.overall for share in summary.shares)
-    assert shares == pytest.approx(1.0, abs=0.01)
+def test_show(command, motion_file, monkeypatch):
+    from dynacom import scene
+
+    shown = []
+
+    def show(robot, q, arrays, summary, *, announce, port):
+        shown.append((robot.name, len(q), len(arrays["time"]), summary["frames"], port))
+        announce("http://localhost:1234")
+
+    monkeypatch.setattr(scene, "show", show)
+    status, out, err = command("show", motion_file(), "--robot", "talos", "--port", "1234")
+    assert (status, err) == (0, "")
+    assert shown == [("talos", 40, 40, 40, 1234)]
+    assert "http://localhost:1234" in out

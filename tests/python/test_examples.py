@@ -21,6 +21,7 @@ def test_there_are_examples():
         "01_centroidal_wrench",
         "02_force_distribution",
         "03_control_loop",
+        "04_motion",
     ]
 
 

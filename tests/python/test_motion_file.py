@@ -1,167 +1,114 @@
 # SPDX-License-Identifier: BSD-2-Clause
-import re
+"""Every format, and the samples of ../shared/data/SOURCES.md."""
+
+import pickle
 
 import numpy as np
+import pinocchio as pin
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-import dynacom
-from dynacom import DynacomError, read_motion
+from dynacom import DynacomError, Motion, read_motion
+from motion_files import assert_notes, body_poses, refuses, sway, write_columns, write_csv
 
 
-def refuses(path, *parts):
-    """Expects an error of one line that begins with the path and holds all parts."""
-    with pytest.raises(DynacomError) as caught:
-        read_motion(path)
-    message = str(caught.value)
-    assert message.startswith(f"{path}: ")
-    assert "\n" not in message
-    for part in parts:
-        assert part in message
-
-
-def test_reads_every_array(motion_file, talos_motion):
-    motion, schedule, extras = read_motion(motion_file())
-    np.testing.assert_array_equal(motion.time, talos_motion["t"])
-    for name in "qva":
-        np.testing.assert_array_equal(getattr(motion, name), talos_motion[name])
-    assert schedule.names == ["left_sole", "right_sole"]
-    np.testing.assert_array_equal(schedule.active, talos_motion["contacts"])
-    assert extras == {}
-
-
-def test_accepts_str_paths_compressed_archives_and_other_numbers(tmp_path, talos_motion):
-    path = tmp_path / "motion.npz"
-    arrays = talos_motion | {
-        "t": np.arange(len(talos_motion["t"])),
-        "q": np.asfortranarray(talos_motion["q"]),
-        "v": talos_motion["v"].astype(np.float32),
-        "a": talos_motion["a"].astype(">f8"),
-    }
-    np.savez_compressed(path, **arrays)
-    motion = read_motion(str(path)).motion
-    np.testing.assert_array_equal(motion.time, arrays["t"])
-    for name in "qva":
-        np.testing.assert_array_equal(getattr(motion, name), arrays[name])
-
-
-def test_hands_out_other_arrays_and_leaves_pickles_alone(motion_file):
-    path = motion_file(wrenches=np.ones((3, 2)), meta=np.array({"a": 1}, dtype=object))
-    extras = read_motion(path).extras
-    assert extras.keys() == {"wrenches"}
-    np.testing.assert_array_equal(extras["wrenches"], np.ones((3, 2)))
-
-
-def test_contacts_may_be_absent(motion_file):
-    assert read_motion(motion_file(contacts=None, contact_names=None)).schedule is None
-
-
-@pytest.mark.parametrize("name", ["contacts", "contact_names"])
-def test_contacts_and_their_names_come_together(motion_file, name):
-    refuses(motion_file(**{name: None}), f"missing array '{name}'")
-
-
-@pytest.mark.parametrize("name", ["t", "q", "v", "a"])
-def test_missing_array(motion_file, name):
-    others = [other for other in "tqva" if other != name]
-    refuses(motion_file(**{name: None}), f"missing array '{name}', got {', '.join(others)}")
-
-
-def test_missing_file(tmp_path):
-    refuses(tmp_path / "none.npz", "cannot be read (No such file or directory)")
-
-
-def test_folder(tmp_path):
-    refuses(tmp_path, "cannot be read (Is a directory)")
-
-
-@pytest.mark.parametrize("content", [b"", b"time,q\n0,1\n", b"\x80\x04K\x01."])
-def test_other_files(tmp_path, content):
-    path = tmp_path / "motion.npz"
-    path.write_bytes(content)
-    refuses(path, "must be a NumPy archive (.npz), got another file")
-
-
-def test_single_array(tmp_path):
-    path = tmp_path / "motion.npy"
-    np.save(path, np.ones(3))
-    refuses(path, "must be a NumPy archive (.npz), got a single array")
-
-
-def test_empty_archive(tmp_path):
-    path = tmp_path / "motion.npz"
-    np.savez(path)
-    refuses(path, "missing array 't', got none")
-
-
-def test_pickled_array_is_not_loaded(motion_file):
-    path = motion_file(q=np.array([[1, "x"]], dtype=object))
-    refuses(path, "array 'q' cannot be read", "allow_pickle=False")
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "expected"),
-    [
-        ("t", np.array(["0", "1"]), "must be of real numbers, got <U1"),
-        ("q", np.ones((2, 39), dtype=complex), "must be of real numbers, got complex128"),
-        ("v", np.ones((2, 38), dtype=bool), "must be of real numbers, got bool"),
-        ("contacts", np.ones((40, 2)), "must be of bool, got float64"),
-        ("contact_names", np.array([1, 2]), "must be of str, got int64"),
-        ("t", np.ones((40, 1)), "must have 1 dimension, got shape (40, 1)"),
-        ("q", np.ones(39), "must have 2 dimensions, got shape (39,)"),
-        ("a", np.array(1.0), "must have 2 dimensions, got shape ()"),
-        ("contacts", np.ones(40, dtype=bool), "must have 2 dimensions, got shape (40,)"),
-        ("contact_names", np.array("left_sole"), "must have 1 dimension, got shape ()"),
-    ],
-)
-def test_wrong_type_or_shape(motion_file, name, value, expected):
-    refuses(motion_file(**{name: value}), f"array '{name}' {expected}")
-
-
-# What reading leaves to the analysis, where the robot is known.
-@pytest.mark.parametrize(
-    ("name", "change", "expected"),
-    [
-        ("t", lambda t: t[::-1].copy(), r"time must increase, .* in frame 1"),
-        ("t", lambda t: t[:0], r"time must have at least one frame, got 0"),
-        (
-            "t",
-            lambda t: np.where(t > 0.5, np.nan, t),
-            r"time must be finite, got -?nan in frame 26",
-        ),
-        ("q", lambda q: q[:, :-1], r"q must have 39 .*, got 38"),
-        ("v", lambda v: v[:-1], r"v must have 40 frames, got 39"),
-        ("a", lambda a: np.where(np.arange(40)[:, None] == 7, np.inf, a), r"a must be finite.* 7"),
-        ("contacts", lambda c: c[:-1], r"active must have 40 frames, got 39"),
-        ("contacts", lambda c: c[:, :1], r"active must have 2 contacts, got 1"),
-        ("contact_names", lambda c: c[[0, 0]], r"'left_sole' twice"),
-        ("contact_names", lambda c: np.array(["left_sole", "hand"]), r"hand"),
-    ],
-)
-def test_analysis_checks_the_rest(motion_file, talos, talos_motion, name, change, expected):
-    motion, schedule, _ = read_motion(motion_file(**{name: change(talos_motion[name])}))
-    with pytest.raises(ValueError, match=expected):
-        dynacom.analyzeMotion(talos.dynacom(), motion, schedule)
-
-
-@settings(max_examples=300, deadline=None)
-@given(cut=st.integers(min_value=0, max_value=2000), flip=st.binary(min_size=1, max_size=8))
-def test_damaged_files_give_one_line(tmp_path_factory, cut, flip):
-    path = tmp_path_factory.mktemp("damaged") / "motion.npz"
-    np.savez_compressed(
-        path,
-        t=np.arange(3.0),
-        q=np.ones((3, 7)),
-        v=np.ones((3, 6)),
-        a=np.ones((3, 6)),
-        contacts=np.ones((3, 1), dtype=bool),
-        contact_names=np.array(["foot"]),
+@pytest.mark.parametrize("name", ["clip.txt", "clip", "clip.npy", "clip.csv.zip", "clip.gz", "npz"])
+def test_other_suffixes(tmp_path, toy, name):
+    (tmp_path / name).write_text("1,2")
+    expected = (
+        f"must end in one of .csv, .csv.gz, .parquet, .npz, .pkl, .pickle, .joblib, got '{name}'"
     )
-    content = path.read_bytes()
-    cut %= len(content)
-    path.write_bytes(content[:cut] + flip + content[cut + len(flip) :])
-    try:
-        read_motion(path)
-    except DynacomError as error:
-        assert re.match(r"[^\n]*motion\.npz: [^\n]+$", str(error))
+    refuses(tmp_path / name, toy, expected)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".parquet", ".npz", ".pkl"])
+def test_missing_files_and_folders(tmp_path, toy, suffix):
+    path = tmp_path / f"clip{suffix}"
+    refuses(path, toy, "cannot be read (No such file or directory)")
+    path.mkdir()
+    refuses(path, toy, "cannot be read (Is a directory)")
+
+
+def test_unknown_order(tmp_path, toy):
+    path = write_csv(tmp_path / "clip.csv", sway(toy).table)
+    with pytest.raises(DynacomError, match=r"^quat must be xyzw or wxyz, got 'xyz'$"):
+        read_motion(path, toy, quat="xyz")
+
+
+def test_every_format_gives_the_same(tmp_path, humanoid):
+    motion = sway(humanoid)
+    csv = write_csv(tmp_path / "bare.csv", motion.table)
+    header = write_columns(tmp_path / "header.csv", motion.columns)
+    plain, tracking = tmp_path / "plain.npz", tmp_path / "tracking.npz"
+    np.savez(plain, t=motion.time, q=motion.q)
+    links = [f.name for f in humanoid.model.frames if f.type == pin.FrameType.BODY]
+    position, quaternion = body_poses(humanoid, motion.q, links)
+    np.savez(tracking, fps=60, joint_pos=motion.angles, body_pos_w=position, body_quat_w=quaternion)
+    retargeted = tmp_path / "clip.pkl"
+    content = {"root_pos": motion.position, "root_rot": motion.quaternion, "dof_pos": motion.angles}
+    retargeted.write_bytes(pickle.dumps({"fps": 60, **content}))
+    for path in (csv, header, plain, tracking, retargeted):
+        clip = read_motion(path, humanoid, fps=60)
+        np.testing.assert_allclose(clip.time, motion.time, atol=1e-15)
+        np.testing.assert_allclose(clip.q, motion.q, atol=1e-12)
+        assert len(clip.joint_names) == 29
+        zero = np.zeros((len(clip.time), humanoid.model.nv))
+        Motion(clip.time, clip.q, zero, zero).validate(humanoid.model)
+
+
+def test_errors_for_every_way_to_be_wrong_give_no_warnings(tmp_path, toy, recwarn):
+    """A command prints one line."""
+    for value in (1e300, -1e300, 1e-320):
+        table = sway(toy).table
+        table[3] = value
+        refuses(write_csv(tmp_path / "clip.csv", table), toy, fps=60)
+    assert list(recwarn) == []
+
+
+# The samples.
+
+
+def test_both_files_of_a_clip_agree(shared_data, humanoid):
+    """Frame by frame, from the first one on; the archive has one frame less."""
+    csv = read_motion(shared_data / "B_HandsUp.csv", humanoid, fps=60)
+    npz = read_motion(shared_data / "B_HandsUp.npz", humanoid)
+    assert csv.q.shape == (442, 36)
+    assert npz.q.shape == (441, 36)
+    np.testing.assert_array_equal(csv.time[:441], npz.time)
+    # Six digits, once more interpolated.
+    np.testing.assert_allclose(csv.q[:441], npz.q, rtol=0, atol=1e-5)
+    assert abs(csv.q[1:] - npz.q).max() > 1e-2
+    assert_notes(csv, "in the order of the URDF")
+    assert_notes(npz, "by the poses of the bodies their order is the order of the URDF", "within")
+    # Its velocities are central differences.
+    v = [pin.difference(humanoid.model, *pair) for pair in zip(npz.q, npz.q[2:], strict=False)]
+    np.testing.assert_allclose(npz.v[1:-1], 30.0 * np.array(v), rtol=0, atol=1e-3)
+
+
+def test_a_dance(shared_data, humanoid):
+    """With steps that are as fast as retargeted mocap gets."""
+    path = shared_data / "J_Dance0_StepTouch.csv"
+    clip = read_motion(path, humanoid, fps=60)
+    assert clip.q.shape == (1949, 36)
+    assert clip.time[-1] == pytest.approx(1948 / 60)
+    assert_notes(clip, "in the order of the URDF")
+    refuses(path, humanoid, "give --fps")
+    refuses(path, humanoid, "got x y z w", "give --quat xyzw", fps=60, quat="wxyz")
+    refuses(path, humanoid, "right_shoulder_pitch_joint jumps", "78.7 rad/s", fps=120)
+
+
+def test_a_clip_with_a_box(shared_data, humanoid, talos):
+    """Of a robot whose waist is a centimetre higher."""
+    path = shared_data / "sub3_largebox_003_mj.npz"
+    clip = read_motion(path, humanoid)
+    assert clip.q.shape == (325, 36)
+    assert clip.time[1] == 1 / 50
+    assert_notes(clip, "Forward kinematics puts the links within 1.0e-02 m of the file's bodies.")
+    v = [pin.difference(humanoid.model, *pair) for pair in zip(clip.q, clip.q[2:], strict=False)]
+    np.testing.assert_allclose(clip.v[1:-1], 25.0 * np.array(v), rtol=0, atol=0.05)
+    refuses(path, humanoid, "must be x y z w, got w x y z", "give --quat wxyz", quat="xyzw")
+    refuses(path, talos, "must have the joints of talos, got left_hip_pitch_joint, ", "23 more")
+
+
+def test_clips_of_another_robot(shared_data, talos):
+    refuses(shared_data / "B_HandsUp.csv", talos, "32 of the joints of talos, got 36", fps=60)
+    refuses(shared_data / "B_HandsUp.npz", talos, "must have 32 joints, as talos does, got 29")

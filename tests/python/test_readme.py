@@ -86,7 +86,7 @@ def test_command(command, tmp_path):
             r"Relaxed +│ 120 ", done.stdout
         )
     if command == "scripts/demo":
-        assert "demo_output/frames.csv" in done.stdout.splitlines()[-1]
+        assert "demo_output/report.html" in done.stdout.splitlines()
 
 
 def test_every_motion_and_script_is_shown():

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """Motions by third parties, which are not part of the repository: ../shared/data/SOURCES.md."""
 
-from pathlib import Path
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,17 +8,10 @@ from numpy.testing import assert_allclose
 
 from dynacom import DistributionStatus, DynaCoM
 from dynacom.robots import Robot
-from helpers import SHARED_DATA, assert_gives_wrench, assert_within_cones, to_com
+from helpers import assert_gives_wrench, assert_within_cones, to_com
 
 SOLVED = DistributionStatus.Solved
 FEET = {"left_sole": "left_sole_link", "right_sole": "right_sole_link"}
-
-
-@pytest.fixture(scope="module")
-def shared_data() -> Path:
-    if not SHARED_DATA.is_dir():
-        pytest.skip("the folder ../shared/data is not there")
-    return SHARED_DATA
 
 
 @pytest.fixture

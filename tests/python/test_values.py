@@ -23,7 +23,7 @@ from dynacom import (
     Motion,
     WrenchDistribution,
 )
-from helpers import point, point_settings, sole, sole_settings
+from helpers import WALKS, point, point_settings, sole, sole_settings
 
 # Not objects of their own: nobody makes one, or an error.
 ABSTRACT = {"ContactBase", "DynacomError", "NotReadyError"}
@@ -41,6 +41,7 @@ def objects(talos, talos_standing, talos_motion):
     schedule = ContactSchedule(["left_sole", "right_sole"], talos_motion["contacts"])
     analysis = dynacom.analyzeMotion(robot, motion, schedule)
     result = robot.getDistribution()
+    report = dynacom.analyze(WALKS / "talos_walk.npz", talos)
     objects = [
         state,
         dynacom.computeGroundWrench(state, [0.0, 0.0, -9.81]),
@@ -60,7 +61,17 @@ def objects(talos, talos_standing, talos_motion):
         analysis,
         analysis.contacts[0],
         talos,
-        dynacom.MotionFile(motion, schedule, {}),
+        dynacom.Payload("torso_2_link", 3.0, (0.0, 0.1, 0.2)),
+        dynacom.compareDerivatives(talos.model, motion),
+        dynacom.computeContactMotions(robot, motion)[0],
+        dynacom.DetectionSettings(),
+        dynacom.VerdictSettings(),
+        dynacom.FaultLimit(0.1, 0.2),
+        dynacom.AnalysisOptions(),
+        report.clip,
+        report,
+        report.verdict,
+        report.verdict.findings["quaternion"],
     ]
     return {type(value).__qualname__: value for value in objects} | {
         "DistributionResult.Contact": result.contacts[0],
@@ -139,7 +150,8 @@ def test_what_printing_tells(objects):
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
 def test_everything_can_be_copied(objects, copied):
     for name, value in objects.items():
-        if name == "Robot":  # holds a pinocchio.Model, which says itself how it is copied
+        # They hold a pinocchio.Model, which says itself how it is copied.
+        if name in ("Robot", "MotionReport"):
             continue
         other = copied(value)
         assert type(other) is type(value), name

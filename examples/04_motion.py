@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""Lesson 4. Is a motion possible? Configurations in, a verdict out."""
+
+import numpy as np
+import pinocchio
+
+import dynacom
+
+talos = dynacom.load_robot("talos").dynacom()
+model = talos.getModel()
+rest = np.zeros(model.nv)
+
+
+def crouch(period):
+    """Configurations of two crouches, 100 a second, with the feet where they are."""
+    time = np.arange(int(200 * period) + 1) / 100
+    q = np.tile(pinocchio.neutral(model), (len(time), 1))
+    for row, t in zip(q, time, strict=True):
+        bend = 0.2 + 0.3 * (1 - np.cos(2 * np.pi * t / period))
+        for side in "left", "right":
+            for joint, angle in (3, -bend), (4, 2 * bend), (5, -bend):
+                row[model.idx_qs[model.getJointId(f"leg_{side}_{joint}_joint")]] = angle
+        talos.computeDynamics(row, rest, rest)
+        row[:3] -= talos.getContact("left_sole").getSurfacePose().translation
+    return time, q
+
+
+for period in 2.0, 0.5:
+    time, q = crouch(period)
+
+    # Velocities and accelerations, without what is faster than 6 Hz.
+    smooth = dynacom.filterConfigurations(model, q, rate=100.0, cutoff=6.0)
+    motion = dynacom.differentiate(model, time, smooth)
+
+    # Which feet touch the ground, and when? What must they give, and what can they?
+    contacts = dynacom.computeContactMotions(talos, motion)
+    ground = dynacom.estimateGround(contacts, time)
+    schedule = dynacom.detectContacts(contacts, time, ground)
+    analysis = dynacom.analyzeMotion(talos, motion, schedule)
+
+    # And is that enough?
+    verdict = dynacom.judgeMotion(talos, motion, q, np.zeros(len(time)), contacts, ground, analysis)
+    largest = analysis.ground_force[:, 2].max() / (talos.getMass() * 9.81)
+    share = 100 * schedule.active.mean()
+    print(f"A crouch in {period:.1f} s: {'feasible' if verdict.feasible else 'not feasible'}")
+    print(f"  on the ground {share:.0f} %, up to {largest:.2f} m g")
+    for code, finding in verdict.findings.items():
+        if finding.holds:
+            print(f"  {code}: {finding.frames} frames, worst at {finding.time:.2f} s")

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""How a motion is analysed: settings with their defaults, from a file and from the command line.
+
+A settings file is YAML; what it does not name stays at its default::
+
+    cutoff: 6.0           # of the filter [Hz]; null for none
+    omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
+    flat: true            # the ground is flat and horizontal: see the CoP
+    detection:            # DetectionSettings, field by field
+      height: 0.015
+      ground_height: null # [m]; null if it is to be estimated
+    verdict:              # VerdictSettings: a limit, and the part of the frames that may exceed it
+      residual_force: {limit: 0.1, allowed_share: 0.05}
+      near_ground: 0.06
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from dynacom.dynacom_pywrap import DetectionSettings, FaultLimit, VerdictSettings
+from dynacom.errors import DynacomError
+from dynacom.yaml_file import is_number, parse_yaml, read_yaml
+
+
+@dataclass(slots=True)
+class AnalysisOptions:
+    """How a motion is analysed."""
+
+    #: Of the filter where velocities and accelerations are computed [Hz]; None for no filter.
+    cutoff: float | None = 6.0
+    #: Of virtual repellent point and divergent component of motion [rad/s]; 0 stands for
+    #: sqrt(g / mean height of the CoM above the ground).
+    omega: float = 0.0
+    #: Whether the centre of pressure is that of flat horizontal ground.
+    flat: bool = True
+    detection: DetectionSettings = field(default_factory=DetectionSettings)
+    verdict: VerdictSettings = field(default_factory=VerdictSettings)
+
+    def validate(self) -> None:
+        """Raises ValueError, naming the first setting out of its range."""
+        if self.cutoff is not None and not (math.isfinite(self.cutoff) and self.cutoff > 0.0):
+            raise ValueError(f"cutoff must be finite and > 0 Hz, or none, got {self.cutoff:g}")
+        if not (math.isfinite(self.omega) and self.omega >= 0.0):
+            raise ValueError(f"omega must be finite and >= 0 rad/s, got {self.omega:g}")
+        self.detection.validate()
+        self.verdict.validate()
+
+    def update(self, values: Any, where: str) -> None:
+        """Changes some of the settings; all of them or, where it raises, none.
+
+        Args:
+            values: a mapping as in a settings file.
+            where: what the message calls it.
+
+        Raises:
+            DynacomError: a name is none of a setting, or a value none that it can have.
+        """
+        self._update([(values, where)], where)
+
+    def update_from_file(self, path: str | Path) -> None:
+        """Changes the settings that a file names.
+
+        Raises:
+            DynacomError: the file cannot be read, and as :meth:`update`.
+        """
+        content = read_yaml(path)
+        self.update({} if content is None else content, str(path))
+
+    def update_from_texts(self, texts: Iterable[str]) -> None:
+        """Changes settings by texts like ``verdict.residual_force.limit=0.2``.
+
+        Raises:
+            DynacomError: a text is none of that form, and as :meth:`update`.
+        """
+        changes = []
+        for text in texts:
+            path, equals, value = text.partition("=")
+            if not equals or not value:
+                raise DynacomError(f"setting must be NAME=VALUE, got '{text}'")
+            try:
+                content = parse_yaml(value)
+            except ValueError:
+                content = value
+            for name in reversed(path.split(".")):
+                content = {name: content}
+            changes.append((content, f"setting '{text}'"))
+        self._update(changes, "settings")
+
+    def _update(self, changes: list[tuple[Any, str]], where: str) -> None:
+        # What is in range depends on other settings: it is looked at when all have been changed.
+        changed = replace(self, detection=self.detection.copy(), verdict=self.verdict.copy())
+        for values, place in changes:
+            _update(changed, values, place)
+        try:
+            changed.validate()
+        except ValueError as error:
+            raise DynacomError(f"{where}: {error}") from error
+        for name in _names(self):
+            setattr(self, name, getattr(changed, name))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The settings, as a settings file would hold them."""
+        return _to_dict(self)
+
+
+_GROUPS = (AnalysisOptions, DetectionSettings, VerdictSettings, FaultLimit)
+
+
+def _names(group: Any) -> list[str]:
+    if isinstance(group, AnalysisOptions):
+        return list(AnalysisOptions.__dataclass_fields__)
+    properties = vars(type(group)).items()
+    return [name for name, value in properties if isinstance(value, property)]
+
+
+def _to_dict(group: Any) -> dict[str, Any]:
+    values = {name: getattr(group, name) for name in _names(group)}
+    return {
+        name: _to_dict(value) if isinstance(value, _GROUPS) else _without_nan(value)
+        for name, value in values.items()
+    }
+
+
+def _without_nan(value: float | None) -> float | None:
+    return None if value is None or math.isnan(value) else value
+
+
+# What null stands for, where it may.
+_NULL = {"cutoff": None, "ground_height": math.nan}
+
+
+def _update(group: Any, values: Any, where: str) -> None:
+    names = _names(group)
+    if not isinstance(values, dict):
+        raise DynacomError(f"{where}: must be a mapping with {', '.join(names)}, got {values!r}")
+    for name, value in values.items():
+        if name not in names:
+            raise DynacomError(f"{where}: unknown setting {name!r}, expected {', '.join(names)}")
+        now = getattr(group, name)
+        if isinstance(now, _GROUPS):
+            _update(now, value, f"{where}: {name}")
+            setattr(group, name, now)
+        elif isinstance(now, bool):
+            if not isinstance(value, bool):
+                raise DynacomError(f"{where}: {name} must be true or false, got {value!r}")
+            setattr(group, name, value)
+        elif value is None and name in _NULL:
+            setattr(group, name, _NULL[name])
+        elif is_number(value):
+            setattr(group, name, float(value))
+        else:
+            expected = "a finite number or null" if name in _NULL else "a finite number"
+            raise DynacomError(f"{where}: {name} must be {expected}, got {value!r}")

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""Joints of motion files and of robots: names, orders, angles."""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from dynacom.errors import DynacomError
+from dynacom.robots import Robot
+
+#: Pinocchio's index of the free-flyer, the first joint of every robot.
+ROOT_JOINT = 1
+
+
+def joint_names(robot: Robot) -> tuple[str, ...]:
+    """The joints that a file can give a number of, in the model's order.
+
+    All but the free-flyer and what else has several degrees of freedom.
+    """
+    model = robot.model
+    return tuple(
+        name
+        for index, name in enumerate(model.names)
+        if index > ROOT_JOINT and model.joints[index].nv == 1
+    )
+
+
+def urdf_order(robot: Robot) -> tuple[str, ...]:
+    """:func:`joint_names` in the order of the URDF's text, which the model's need not be."""
+    place = {name: index for index, name in enumerate(_names_in_urdf(robot.urdf))}
+    return tuple(sorted(joint_names(robot), key=lambda name: place.get(name, len(place))))
+
+
+def _names_in_urdf(path: Path) -> tuple[str, ...]:
+    try:
+        return tuple(
+            joint.get("name", "") for joint in ElementTree.parse(path).getroot().findall("joint")
+        )
+    except (OSError, ElementTree.ParseError) as error:
+        raise DynacomError(f"{path}: cannot be read ({error})") from error
+
+
+def tree_orders(robot: Robot) -> dict[str, tuple[str, ...]]:
+    """:func:`joint_names` as simulators order them: what it is called -> the names.
+
+    Siblings stand in the order of the URDF; fixed joints make no level of their own.
+    """
+    model = robot.model
+    place = {name: index for index, name in enumerate(urdf_order(robot))}
+    children: dict[int, list[int]] = {index: [] for index in range(model.njoints)}
+    for index in range(ROOT_JOINT + 1, model.njoints):
+        children[model.parents[index]].append(index)
+    for siblings in children.values():
+        siblings.sort(key=lambda index: place.get(model.names[index], -1))
+
+    breadth = list(children[ROOT_JOINT])
+    for index in breadth:  # which grows
+        breadth += children[index]
+    depth, stack = [], children[ROOT_JOINT][::-1]
+    while stack:
+        depth.append(stack.pop())
+        stack += children[depth[-1]][::-1]
+
+    def names(indices: Sequence[int]) -> tuple[str, ...]:
+        return tuple(model.names[index] for index in indices if model.names[index] in place)
+
+    return {
+        "the order of the URDF": tuple(place),
+        "breadth first": names(breadth),
+        "depth first": names(depth),
+    }
+
+
+def joint_counts(robot: Robot) -> set[int]:
+    """How many joints a file without names may have."""
+    return {len(joint_names(robot)), *map(len, robot.joint_layouts)}
+
+
+def order_without_names(path: Path, robot: Robot, count: int) -> tuple[tuple[str, ...], list[str]]:
+    """The joints that so many columns without names are, and notes.
+
+    Those of the URDF, in its order; or those of one of the robot's layouts.
+
+    Raises:
+        DynacomError: neither has so many.
+    """
+    names = urdf_order(robot)
+    if len(names) == count:
+        return names, ["The joints have no names: they are taken in the order of the URDF."]
+    for layout in robot.joint_layouts:
+        if len(layout) == count:
+            return layout, [
+                f"The joints have no names: they are taken for those of the version of "
+                f"{robot.name} with {count} joints."
+            ]
+    raise wrong_count(path, robot, count)
+
+
+def wrong_count(path: Path, robot: Robot, count: int) -> DynacomError:
+    """The error for so many joints without names."""
+    counts = " or ".join(map(str, sorted(joint_counts(robot))))
+    return DynacomError(f"{path}: must have {counts} joints, as {robot.name} does, got {count}")
+
+
+def match_joints(path: Path, robot: Robot, names: Sequence[str]) -> tuple[list[int], list[str]]:
+    """Finds the robot's joints among the file's.
+
+    Returns:
+        Indices of names that are the robot's, and notes on the others.
+
+    Raises:
+        DynacomError: a name is there twice; or some are not the robot's while the robot has joints
+            that are not named: it is another robot's clip.
+    """
+    known = joint_names(robot)
+    for name in names:
+        if names.count(name) > 1:
+            raise DynacomError(f"{path}: joint '{name}' is there {names.count(name)} times")
+    unknown = [name for name in names if name not in known]
+    missing = [name for name in known if name not in names]
+    if missing and (unknown or len(missing) == len(known)):
+        raise DynacomError(
+            f"{path}: must have the joints of {robot.name}, got {brief(unknown) or 'none'}, "
+            f"and nothing for {brief(missing)}"
+        )
+    notes = [f"Left out, as {robot.name} has no such joints: {brief(unknown)}."] if unknown else []
+    return [index for index, name in enumerate(names) if name in known], notes
+
+
+def brief(names: Sequence[str], most: int = 6) -> str:
+    """The first of the names, and how many there are besides."""
+    rest = len(names) - most
+    return ", ".join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def configurations(
+    robot: Robot,
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    names: Sequence[str],
+    angles: np.ndarray,
+) -> np.ndarray:
+    """Configurations as in Pinocchio, (T, nq); joints that are not named are at their default.
+
+    Args:
+        position: of the root, (T, 3) [m].
+        quaternion: of the root, (T, 4), x y z w.
+        names: of k joints of the robot.
+        angles: (T, k) [rad], of prismatic joints [m].
+    """
+    q = np.tile(robot.default, (len(position), 1))
+    q[:, :3] = position
+    q[:, 3:7] = quaternion
+    for name, angle in zip(names, angles.T, strict=True):
+        joint = robot.model.joints[robot.model.getJointId(name)]
+        if joint.nq == 2:  # without limits: cosine and sine
+            q[:, joint.idx_q] = np.cos(angle)
+            q[:, joint.idx_q + 1] = np.sin(angle)
+        else:
+            q[:, joint.idx_q] = angle
+    return q
+
+
+def joint_angles(robot: Robot, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """The inverse of :func:`configurations`: (T, k)."""
+    angles = np.empty((len(q), len(names)))
+    for column, name in enumerate(names):
+        joint = robot.model.joints[robot.model.getJointId(name)]
+        angles[:, column] = (
+            np.arctan2(q[:, joint.idx_q + 1], q[:, joint.idx_q])
+            if joint.nq == 2
+            else q[:, joint.idx_q]
+        )
+    return angles
+
+
+def is_revolute(joint: pin.JointModel) -> bool:
+    """Whether a joint of one degree of freedom turns."""
+    return joint.shortname().startswith("JointModelR")
+
+
+def rotations(quaternion: np.ndarray) -> np.ndarray:
+    """Rotation matrices, (..., 3, 3), of quaternions x y z w of norm 1, (..., 4)."""
+    x, y, z, w = np.moveaxis(quaternion, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""The report as a page: one HTML file that needs nothing else, no network either.
+
+Its parts lie beside this file: page.html, page.css and page.js, which draws the plots and moves
+plots and scene through time together.
+"""
+
+import base64
+import gzip
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from dynacom import scene
+from dynacom.errors import DynacomError
+from dynacom.robots import Robot
+
+
+def write_page(
+    path: str | Path,
+    robot: Robot,
+    q: np.ndarray,
+    arrays: Mapping[str, np.ndarray],
+    summary: Mapping[str, Any],
+    *,
+    scene_rate: float = 15.0,
+) -> None:
+    """Writes a report's page.
+
+    Args:
+        path: of the HTML file.
+        q: (T, nq), the motion's configurations.
+        arrays: of the report, a row per frame.
+        summary: of the report.
+        scene_rate: frames per second of the 3D scene, at most; plots have all frames.
+
+    Raises:
+        DynacomError: plotly is not installed. Without viser, or without the robot's meshes, there
+            is a page, which says what it lacks.
+        OSError: the file cannot be written.
+    """
+    plotly = _plotly()
+    recording, note = None, None
+    try:
+        recording = scene.record(robot, q, arrays, summary, scene_rate)
+        note = recording.note
+    except DynacomError as error:
+        note = f"There is no 3D scene: {error}."
+    columns = _columns(robot, arrays, summary)
+    data = {
+        "columns": list(columns),
+        "statuses": _statuses(arrays),
+        "contacts": [
+            {
+                "name": name,
+                "color": _css(scene.contact_color(number)),
+                "measured": f"{number}.measured" in columns,
+                "corners": sum(key.startswith(f"{number}.corner") for key in columns) // 2,
+            }
+            for number, name in enumerate(robot.contacts)
+        ],
+        "colors": {name: _css(color) for name, color in scene.COLORS.items()},
+        "thresholds": {reason["code"]: reason["threshold"] for reason in summary["reasons"]},
+        "sceneTimes": [] if recording is None else recording.times.round(6).tolist(),
+    }
+    page = Template(_read("page.html")).substitute(
+        title=f"{escape(summary['clip'])}: {escape(summary['verdict'])}",
+        style=_read("page.css"),
+        script=_read("page.js"),
+        head=_head(summary),
+        verdict=_verdict(summary),
+        notes=_notes([*summary["notes"], *([note] if note else [])]),
+        contacts=_contacts(robot, arrays, summary),
+        sensitivity=_sensitivity(summary),
+        measured=_measured(summary),
+        key=_key(robot),
+        dashed="; dashed: the file's" if any(c["measured"] for c in data["contacts"]) else "",
+        scene_class="" if recording else "none",
+        data=_json(data),
+        # One row a column, the time in double precision.
+        numbers=_pack(
+            columns.pop("time").astype("<f8").tobytes()
+            + np.array(list(columns.values())).astype("<f4").tobytes()
+        ),
+        scene="" if recording is None else _pack(recording.html.encode()),
+        plotly=_pack(plotly.encode()),
+    )
+    # Names of files may hold what is no text.
+    Path(path).write_text(page, encoding="utf-8", errors="replace")
+
+
+def _plotly() -> str:
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as error:
+        raise DynacomError(
+            "the report's page needs plotly, which is not installed: pip install dynacom[motion]"
+        ) from error
+    return get_plotlyjs()
+
+
+def _read(name: str) -> str:
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
+
+
+def _pack(content: bytes) -> str:
+    """Text for a script element that the page unpacks."""
+    return base64.b64encode(gzip.compress(content, mtime=0)).decode("ascii")
+
+
+def _json(value: Any) -> str:
+    """JSON for a script element: nothing in it can end that."""
+    text = json.dumps(value, allow_nan=False)  # in ASCII
+    for character in "<>&":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return text
+
+
+def _css(color: tuple[int, int, int]) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*color)
+
+
+# ---- What is plotted ----
+
+
+def _statuses(arrays: Mapping[str, np.ndarray]) -> list[str]:
+    return sorted({str(status) for status in arrays["status"]})
+
+
+def _columns(
+    robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[str, Any]
+) -> dict[str, np.ndarray]:
+    """What page.js plots: name -> a value per frame. The first is `time`."""
+    weight = scene.weight(robot, summary)
+    statuses = _statuses(arrays)
+    columns = {
+        "time": arrays["time"],
+        "status": np.array([statuses.index(str(status)) for status in arrays["status"]]),
+        "residual_force": np.linalg.norm(arrays["residual"][:, :3], axis=1) / weight,
+        "residual_torque": np.linalg.norm(arrays["residual"][:, 3:], axis=1) / weight,
+        "needed": arrays["ground_force"][:, 2] / weight,
+    }
+    for name in ("com", "cop", "vrp"):
+        columns[f"{name}_x"], columns[f"{name}_y"] = arrays[name].T[:2]
+    for number, (name, settings) in enumerate(robot.contacts.items()):
+        key = f"contact.{name}"
+        up = scene.rotation_matrices(arrays[f"{key}.rotation"])[:, 2]
+        columns[f"{number}.active"] = arrays[f"{key}.active"]
+        columns[f"{number}.force"] = np.sum(up * arrays[f"{key}.force"], axis=1) / weight
+        if f"{key}.measured_force" in arrays:
+            columns[f"{number}.measured"] = (
+                np.sum(up * arrays[f"{key}.measured_force"], axis=1) / weight
+            )
+        columns[f"{number}.friction"] = arrays[f"{key}.friction_usage"]
+        columns[f"{number}.yaw"] = arrays[f"{key}.yaw_usage"]
+        corners = scene.surface_corners(settings, arrays, name)
+        for corner in range(corners.shape[1]):
+            columns[f"{number}.corner{corner}_x"] = corners[:, corner, 0]
+            columns[f"{number}.corner{corner}_y"] = corners[:, corner, 1]
+    return columns
+
+
+# ---- What is written ----
+
+
+def _number(value: float | None, unit: str = "", digits: int = 3) -> str:
+    """A number as people write it; a dash for none."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    text = f"{value:.{digits}g}"
+    if "e" in text:
+        mantissa, exponent = text.split("e")
+        text = f"{mantissa}·10<sup>{int(exponent)}</sup>"
+    return text.replace("-", "−") + (f"&nbsp;{escape(unit)}" if unit else "")
+
+
+def _percent(share: float) -> str:
+    if 0.0 < share < 0.001:
+        return "&lt;&nbsp;0.1&nbsp;%"
+    return f"{100.0 * share:.1f}&nbsp;%"
+
+
+def _moment(time: float | None) -> str:
+    """A time that one can go to."""
+    if time is None:
+        return "–"
+    return f'<button type="button" class="time" data-time="{time!r}">{time:.2f}&nbsp;s</button>'
+
+
+def _table(titles: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
+    """A table of cells that are HTML already; the first of each row is its head."""
+    head = "".join(f'<th scope="col">{title}</th>' for title in titles)
+    body = "".join(
+        f'<tr><th scope="row">{first}</th>' + "".join(f"<td>{cell}</td>" for cell in rest) + "</tr>"
+        for first, *rest in rows
+    )
+    return f'<table class="{kind}"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+
+
+def _head(summary: Mapping[str, Any]) -> str:
+    statuses = ", ".join(f"{count} {escape(name)}" for name, count in summary["statuses"].items())
+    facts = [
+        f"{summary['frames']} frames in {_number(summary['duration'], 's', 4)}"
+        f" ({_number(summary['frame_rate'], 'Hz')})",
+        statuses,
+        _number(summary["mass"], "kg", 4),
+        f"ω = {_number(summary['omega'], 'rad/s')}",
+        f"mean vertical force {_number(summary['mean_vertical_force'], 'm g', 4)}",
+    ]
+    return (
+        f"<h1>{escape(summary['clip'])} <span>on {escape(summary['robot'])}</span></h1>"
+        f"<p class='facts'>{' · '.join(facts)}</p>"
+    )
+
+
+def _verdict(summary: Mapping[str, Any]) -> str:
+    held = [reason for reason in summary["reasons"] if reason["holds"]]
+    others = [reason for reason in summary["reasons"] if not reason["holds"]]
+    good = summary["verdict"] == "feasible"
+    verdict = summary["verdict"]
+    parts = [
+        f'<section class="verdict {"good" if good else "bad"}">',
+        f"<h2>{escape(verdict[:1].upper() + verdict[1:])}</h2>",
+    ]
+    if held:
+        parts.append(_reasons(held))
+    if others:
+        plural = "reasons do" if len(others) > 1 else "reason does"
+        parts += [
+            f"<details><summary>{len(others)} {plural} not hold</summary>",
+            _reasons(others),
+            "</details>",
+        ]
+    return "".join([*parts, "</section>"])
+
+
+def _reasons(reasons: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        (
+            f"<code>{escape(reason['code'])}</code> {escape(reason['text'])}",
+            f"{reason['frames']} ({_percent(reason['share'])})",
+            _percent(reason["allowed_share"]),
+            _number(reason["worst"], reason["unit"]),
+            _number(reason["threshold"], reason["unit"]),
+            _moment(reason["time"]),
+        )
+        for reason in reasons
+    ]
+    titles = ("Reason", "Frames", "allowed", "Worst", "threshold", "at")
+    return _table(titles, rows, "reasons")
+
+
+def _notes(notes: Sequence[str]) -> str:
+    if not notes:
+        return ""
+    items = "".join(f"<li>{escape(note)}</li>" for note in notes)
+    return f"<ul class='notes'>{items}</ul>"
+
+
+def _dot(color: tuple[int, int, int]) -> str:
+    return f'<i style="background: {_css(color)}"></i>'
+
+
+def _key(robot: Robot) -> str:
+    """What the scene's colours mean."""
+    points = {"com": "CoM", "cop": "CoP", "vrp": "VRP", "support": "support"}
+    colors = {title: scene.COLORS[name] for name, title in points.items()}
+    for number, name in enumerate(robot.contacts):
+        colors[f"force on {name}"] = scene.contact_color(number)
+    return "".join(f"<span>{_dot(color)} {escape(text)}</span>" for text, color in colors.items())
+
+
+def _contacts(robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[str, Any]) -> str:
+    rows = []
+    for number, name in enumerate(robot.contacts):
+        contact = summary["contacts"][name]
+        friction = arrays[f"contact.{name}.friction_usage"]
+        rows.append(
+            (
+                f"{_dot(scene.contact_color(number))} {escape(name)}",
+                _percent(contact["active_share"]),
+                _percent(contact["weight_share"]),
+                _number(contact["largest_vertical_force"], "m g"),
+                _number(np.max(friction, initial=-np.inf, where=np.isfinite(friction))),
+                _number(summary["ground"].get(name), "m"),
+            )
+        )
+    titles = (
+        "Contact",
+        "Active",
+        "Share of weight",
+        "Largest vertical force",
+        "Largest friction usage",
+        "Ground at",
+    )
+    return f"<section><h2>Contacts</h2>{_table(titles, rows)}</section>"
+
+
+def _sensitivity(summary: Mapping[str, Any]) -> str:
+    entries = summary["cutoff_sensitivity"]
+    if not entries:
+        return ""
+    rows = [
+        (
+            _number(entry["cutoff"], "Hz") + (" *" if entry["cutoff"] == summary["cutoff"] else ""),
+            _number(entry["residual_force_rms"], "m g"),
+            _number(entry["residual_torque_rms"], "m g·m"),
+            _percent(entry["relaxed_share"]),
+        )
+        for entry in entries
+    ]
+    titles = ("Cut-off", "Residual force, RMS", "Residual moment, RMS", "Frames out of reach")
+    return (
+        "<section><h2>How it depends on the filter</h2>"
+        f"{_table(titles, rows)}<p class='caption'>* used for this report</p></section>"
+    )
+
+
+def _measured(summary: Mapping[str, Any]) -> str:
+    if not summary["measured"]:
+        return ""
+    kinds = {"bias": "bias", "rms": "RMS", "correlation": "correlation"}
+    rows = [
+        (f"{escape(name)}, {title}", *map(_number, values[kind]))
+        for name, values in summary["measured"].items()
+        for kind, title in kinds.items()
+    ]
+    axes = [f"{letter}<sub>{axis}</sub>" for letter in "fτ" for axis in "xyz"]
+    return (
+        "<section><h2>Computed against the file's forces</h2>"
+        f"{_table(('', *axes), rows)}"
+        "<p class='caption'>Computed minus the file's, in the contacts' frames, N and N·m.</p>"
+        "</section>"
+    )

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""The summary of a motion, to be printed."""
+
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+
+def summary_table(summary: dict[str, Any]) -> Table:
+    """The summary of a :class:`MotionReport`, as a table of two columns."""
+    table = Table(show_header=False)
+    table.add_column(style="bold", overflow="fold")
+    table.add_column(overflow="fold")
+
+    feasible = summary["verdict"] == "feasible"
+    table.add_row("Verdict", f"[{'green' if feasible else 'red'}]{summary['verdict']}[/]")
+    for reason in summary["reasons"]:
+        if reason["holds"]:
+            table.add_row(f"  {reason['code']}", escape(reason["text"]))
+    table.add_section()
+    rate = summary["frame_rate"]
+    at = f" at {rate:.6g} Hz" if rate else ""
+    table.add_row("Motion", f"{summary['duration']:.3f} s, {summary['frames']} frames{at}")
+    for status, count in summary["statuses"].items():
+        table.add_row(f"  {status}", f"{count} ({count / summary['frames']:.1%})")
+    table.add_row("Mass", f"{summary['mass']:.3f} kg")
+    mean, change = summary["mean_vertical_force"], summary["momentum_change"]
+    text = f"{mean:.1%} of the weight"
+    if abs(change) >= 0.0005:
+        text += f", of which {change:+.1%} ends in momentum"
+    table.add_row("Mean vertical force", text)
+    for entry in summary["cutoff_sensitivity"]:
+        table.add_row(
+            f"Residual at {entry['cutoff']:g} Hz",
+            f"{entry['residual_force_rms']:.3g} m g, "
+            f"{entry['residual_torque_rms']:.3g} m g m (RMS)",
+        )
+    table.add_section()
+    for name, contact in summary["contacts"].items():
+        text = f"{contact['weight_share']:.1%}"
+        if contact["active_share"] > 0.0:
+            text += (
+                f" ({contact['weight_share_while_active']:.1%} while active, in "
+                f"{contact['active_share']:.1%} of the frames)"
+            )
+        else:
+            text += " (never active)"
+        table.add_row(escape(f"Weight on {name}"), text)
+    for name, compared in summary["measured"].items():
+        table.add_row(
+            escape(f"Measured on {name}"),
+            f"f_z differs by {compared['bias'][2]:.3g} N, {compared['rms'][2]:.3g} N RMS",
+        )
+    if summary["notes"]:
+        table.add_section()
+        for note in summary["notes"]:
+            table.add_row("Note", escape(note))
+    return table

@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""Settings from files and from texts."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import yaml
+
+import dynacom
+from dynacom import AnalysisOptions, DetectionSettings, DynacomError, FaultLimit, VerdictSettings
+from helpers import WALKS
+
+
+@pytest.fixture
+def options() -> AnalysisOptions:
+    return AnalysisOptions()
+
+
+def from_text(text: str) -> AnalysisOptions:
+    options = AnalysisOptions()
+    options.update_from_texts([text])
+    return options
+
+
+def changes(options: AnalysisOptions) -> dict[str, object]:
+    """What differs from the defaults, by its path."""
+
+    def flatten(values: dict, before: str = "") -> dict[str, object]:
+        flat = {}
+        for name, value in values.items():
+            path = f"{before}{name}"
+            flat |= flatten(value, f"{path}.") if isinstance(value, dict) else {path: value}
+        return flat
+
+    defaults = flatten(AnalysisOptions().to_dict())
+    now = flatten(options.to_dict())
+    assert list(now) == list(defaults)
+    return {path: value for path, value in now.items() if value != defaults[path]}
+
+
+def test_defaults(options):
+    assert options.cutoff == 6.0
+    assert options.omega == 0.0
+    assert options.flat is True
+    assert options.detection == DetectionSettings()
+    assert options.verdict == VerdictSettings()
+    options.validate()
+    # Each has its own.
+    options.detection.height = 0.02
+    assert AnalysisOptions().detection.height == 0.015
+
+
+def test_a_file(options, tmp_path):
+    path = tmp_path / "settings.yaml"
+    path.write_text("""
+cutoff: 8
+flat: false
+detection: {height: 0.02, ground_height: -0.1}
+verdict:
+  residual_force: {limit: 2e-1, allowed_share: 0.5}
+  foot_sliding: {limit: 1}
+  near_ground: 0.08
+""")
+    options.update_from_file(path)
+    assert changes(options) == {
+        "cutoff": 8.0,
+        "flat": False,
+        "detection.height": 0.02,
+        "detection.ground_height": -0.1,
+        "verdict.residual_force.limit": 0.2,
+        "verdict.residual_force.allowed_share": 0.5,
+        "verdict.foot_sliding.limit": 1.0,
+        "verdict.near_ground": 0.08,
+    }
+    assert options.verdict.residual_force == FaultLimit(0.2, 0.5)
+    assert options.detection.ground_height == -0.1
+
+
+@pytest.mark.parametrize("text", ["", "# nothing\n", "{}"])
+def test_an_empty_file_changes_nothing(options, tmp_path, text):
+    path = tmp_path / "settings.yaml"
+    path.write_text(text)
+    options.update_from_file(path)
+    assert changes(options) == {}
+
+
+def test_what_is_given_back_can_be_read(options, tmp_path):
+    """The settings in summary.json are a settings file."""
+    options.update_from_texts(["cutoff=null", "omega=3", "verdict.quaternion.limit=0.5"])
+    path = tmp_path / "settings.yaml"
+    for text in (json.dumps(options.to_dict(), allow_nan=False), yaml.safe_dump(options.to_dict())):
+        path.write_text(text)
+        again = AnalysisOptions()
+        again.update_from_file(path)
+        assert again.to_dict() == options.to_dict()
+        assert again == options
+
+
+def test_every_setting_can_be_set_by_a_text():
+    """And each is one of its own."""
+
+    def paths(values: dict, before: str = "") -> list[str]:
+        found = []
+        for name, value in values.items():
+            path = f"{before}{name}"
+            found += paths(value, f"{path}.") if isinstance(value, dict) else [path]
+        return found
+
+    every = paths(AnalysisOptions().to_dict())
+    assert len(every) == 3 + 8 + 2 * 8 + 1
+    for path in every:
+        value = False if path == "flat" else 0.51
+        limits = {"detection.height": "release_height", "detection.speed": "release_speed"}
+        if path in limits:
+            options = AnalysisOptions()
+            options.update_from_texts([f"{path}=0.51", f"detection.{limits[path]}=0.6"])
+            assert changes(options)[path] == 0.51
+        else:
+            text = f"{path}={str(value).lower()}"
+            assert changes(from_text(text)) == {path: value}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("cutoff=null", {"cutoff": None}),
+        ("cutoff=1e-3", {"cutoff": 0.001}),
+        ("flat=no", {"flat": False}),
+        (
+            "detection={height: 0.01, rest_speed: 1}",
+            {"detection.height": 0.01, "detection.rest_speed": 1.0},
+        ),
+        ("verdict.near_ground=0", {"verdict.near_ground": 0.0}),
+        ("verdict.discontinuity={limit: 1}", {"verdict.discontinuity.limit": 1.0}),
+    ],
+)
+def test_texts(text, expected):
+    assert changes(from_text(text)) == expected
+
+
+def test_null_is_the_ground_that_is_estimated(options):
+    options.update_from_texts(["detection.ground_height=0.3"])
+    assert options.detection.ground_height == 0.3
+    options.update_from_texts(["detection.ground_height=null"])
+    assert np.isnan(options.detection.ground_height)
+    assert options.to_dict()["detection"]["ground_height"] is None
+
+
+def test_ranges_are_looked_at_when_all_is_set(options):
+    """One setting may need another, whichever comes first."""
+    texts = ["detection.height=0.1", "detection.release_height=0.2"]
+    for order in (texts, texts[::-1]):
+        options = AnalysisOptions()
+        options.update_from_texts(order)
+        assert (options.detection.height, options.detection.release_height) == (0.1, 0.2)
+
+
+def test_the_last_counts(options):
+    options.update_from_texts(["cutoff=3", "omega=1", "cutoff=4"])
+    assert changes(options) == {"cutoff": 4.0, "omega": 1.0}
+
+
+# Errors.
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("cutoff", ["setting must be NAME=VALUE", "got 'cutoff'"]),
+        ("cutoff=", ["setting must be NAME=VALUE", "got 'cutoff='"]),
+        ("", ["setting must be NAME=VALUE", "got ''"]),
+        ("=3", ["setting '=3'", "unknown setting ''", "cutoff, omega, flat, detection, verdict"]),
+        ("speed=3", ["setting 'speed=3'", "unknown setting 'speed'", "expected cutoff"]),
+        ("detection.mu=3", ["detection: unknown setting 'mu'", "expected height, speed"]),
+        ("verdict.feasible=3", ["verdict: unknown setting 'feasible'", "residual_force"]),
+        ("verdict.quaternion.share=3", ["quaternion: unknown", "expected limit, allowed_share"]),
+        ("cutoff=six", ["cutoff must be a finite number or null", "got 'six'"]),
+        ("cutoff=[1", ["cutoff must be a finite number", "got '[1'"]),
+        ("cutoff=.inf", ["cutoff must be a finite number", "got inf"]),
+        ("cutoff=2020-99-99", ["cutoff must be a finite number", "got '2020-99-99'"]),
+        (f"cutoff=1{400 * '0'}", ["cutoff must be a finite number", "got 1000"]),
+        ("cutoff.x=1", ["cutoff must be a finite number", "got {'x': 1}"]),
+        ("cutoff=-1", ["settings: cutoff must be finite and > 0 Hz, or none, got -1"]),
+        ("cutoff=0", ["settings: cutoff must be finite and > 0 Hz, or none, got 0"]),
+        ("omega=-1", ["settings: omega must be finite and >= 0 rad/s, got -1"]),
+        ("omega=null", ["omega must be a finite number", "got None"]),
+        ("flat=1", ["flat must be true or false", "got 1"]),
+        ("detection=3", ["detection: must be a mapping with height, speed", "got 3"]),
+        ("detection.height=true", ["detection: height must be a finite number", "got True"]),
+        ("detection.height=-1", ["settings: DetectionSettings.height must be", "got -1"]),
+        ("detection.height=1", ["settings: DetectionSettings.release_height must be", "got 0.03"]),
+        ("detection.ground_height=.nan", ["ground_height must be a finite number or null", "nan"]),
+        ("verdict.quaternion=1", ["verdict: quaternion: must be a mapping with limit", "got 1"]),
+        ("verdict.quaternion.limit=-1", ["VerdictSettings.quaternion.limit must be", "got -1"]),
+        ("verdict.quaternion.allowed_share=2", ["allowed_share must be from 0 to 1", "got 2"]),
+    ],
+)  # fmt: skip
+def test_errors_name_the_thing_and_change_nothing(options, text, parts):
+    with pytest.raises(DynacomError) as caught:
+        options.update_from_texts(["omega=2", "verdict.near_ground=0.5", text])
+    message = str(caught.value)
+    assert "\n" not in message
+    for part in parts:
+        assert part in message
+    assert changes(options) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("{", ["must be YAML"]),
+        ("[1]", ["must be a mapping with cutoff, omega, flat, detection, verdict", "got [1]"]),
+        ("cutoff", ["must be a mapping with", "got 'cutoff'"]),
+        ("1: 2", ["unknown setting 1", "expected cutoff"]),
+        ("cutoff: 1\ncutoff: 2", ["must be YAML", "'cutoff' twice"]),
+        ("omega: 2\nverdict: {foot_sliding: {limit: x}}", ["verdict: foot_sliding: limit", "'x'"]),
+        ("omega: 2\ndetection: {speed: 9}", ["DetectionSettings.release_speed must be"]),
+        ("omega: 2\nverdict:", ["verdict: must be a mapping with", "got None"]),
+    ],
+)
+def test_errors_in_files(options, tmp_path, text, parts):
+    path = tmp_path / "settings.yaml"
+    path.write_text(text)
+    with pytest.raises(DynacomError, match=f"^{re.escape(str(path))}: ") as caught:
+        options.update_from_file(path)
+    for part in parts:
+        assert part in str(caught.value)
+    assert changes(options) == {}
+
+
+def test_files_that_cannot_be_read(options, tmp_path):
+    with pytest.raises(DynacomError, match=r"none\.yaml: cannot be read \(No such file"):
+        options.update_from_file(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("cutoff", -1.0, "cutoff must be finite and > 0 Hz, or none, got -1"),
+        ("cutoff", np.nan, "cutoff must be finite and > 0 Hz, or none, got nan"),
+        ("omega", np.inf, "omega must be finite and >= 0 rad/s, got inf"),
+        ("detection", None, "DetectionSettings.speed must be finite"),
+        ("verdict", None, "VerdictSettings.near_ground must be finite"),
+    ],
+)
+def test_analyze_refuses_what_is_out_of_range(options, tmp_path, name, value, message):
+    """Before it reads anything, and although the motion has derivatives of its own."""
+    if name == "detection":
+        options.detection.speed = -1.0
+    elif name == "verdict":
+        options.verdict.near_ground = -1.0
+    else:
+        setattr(options, name, value)
+    for path in (WALKS / "talos_walk.npz", tmp_path / "none.npz"):
+        with pytest.raises(ValueError, match=f"^{message}"):
+            dynacom.analyze(path, "talos", options=options)

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""The report's page, and the scene in it."""
+
+import dataclasses
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from playwright.sync_api import Page
+
+from browser import difference, open_page, open_scene, settled_picture, wait_for
+from dynacom import DynacomError, page
+from dynacom.page import write_page
+from dynacom.robots import Robot
+from helpers import WALKS
+from report_case import Arrays, Summary, walk_report
+
+Report = tuple[np.ndarray, Arrays, Summary]
+
+HOSTILE = '</script><script>alert("x")</script><img src=x onerror=alert(1)>&lt;b&gt;%{y}$title'
+
+
+@pytest.fixture(scope="module")
+def hurried(talos: Robot) -> Report:
+    """The walk, made so fast that Talos would fall."""
+    haste = 1.85
+    with np.load(WALKS / "talos_walk.npz") as file:
+        faster = {"t": file["t"] / haste, "v": haste * file["v"], "a": haste**2 * file["a"]}
+    q, arrays, summary = walk_report(talos, **faster)
+    summary["clip"] = "talos_hurries.npz"
+    assert summary["verdict"] == "not feasible"
+    return q, arrays, summary
+
+
+@pytest.fixture(scope="module")
+def hurried_page(talos: Robot, hurried: Report, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    write_page(path, talos, *hurried)
+    return path
+
+
+def reason(summary: Summary, code: str) -> dict[str, Any]:
+    return next(reason for reason in summary["reasons"] if reason["code"] == code)
+
+
+# ---- The page in a browser ----
+
+TIME_PLOTS = ("forces", "friction", "residual_force", "residual_torque", "schedule")
+
+
+def cursors(tab: Page) -> list[float]:
+    """Where the cursors are in the plots, from the left of the page."""
+    return tab.evaluate(
+        "Array.from(document.querySelectorAll('.cursor'), (c) => c.getBoundingClientRect().x)"
+    )
+
+
+def clock(tab: Page) -> float:
+    return float(tab.locator("#clock").inner_text().split()[0])
+
+
+def shown_times(tab: Page) -> np.ndarray:
+    """The first and the last time that each of the plots shows."""
+    script = "(ids) => ids.map((id) => document.getElementById(id).layout.xaxis.range)"
+    return np.array(tab.evaluate(script, list(TIME_PLOTS)))
+
+
+class Axis:
+    """The axis of time of the plots, from the left of the page."""
+
+    def __init__(self, tab: Page, time: np.ndarray) -> None:
+        tab.locator("#forces").scroll_into_view_if_needed()
+        box = tab.locator("#forces").bounding_box()
+        margin = tab.evaluate("document.getElementById('forces').layout.margin")
+        self.first, self.duration = time[0], time[-1] - time[0]
+        self.left = box["x"] + margin["l"]
+        self.width = box["width"] - margin["l"] - margin["r"]
+        self.middle = box["y"] + box["height"] / 2  # of the plot's height
+
+    def place(self, time: float) -> float:
+        return self.left + self.width * (time - self.first) / self.duration
+
+
+def test_page_in_a_browser(hurried_page, hurried, request, root):
+    _, arrays, summary = hurried
+    time = arrays["time"]
+    with open_page(hurried_page) as tab:
+        player = open_scene(tab).locator("input.mantine-NumberInput-input")
+        assert tab.locator(".verdict h2").inner_text() == "Not feasible"
+        for plot in ("above", *TIME_PLOTS[:-1]):
+            lengths = tab.locator(f"#{plot} path.js-line").evaluate_all(
+                "(lines) => lines.map((line) => line.getTotalLength())"
+            )
+            assert max(lengths) > 100.0, plot
+        assert tab.locator("#schedule .bars path").count() >= 10
+        at_first = settled_picture(tab, "#scene")
+        assert at_first.std(axis=(0, 1)).min() > 0.02
+
+        # A reason leads to its time, everywhere.
+        holding = reason(summary, "residual_torque")
+        assert holding["holds"]
+        tab.get_by_role("row", name="residual_torque").get_by_role("button").click()
+        wait_for(lambda: abs(clock(tab) - holding["time"]) < 1e-3, "the clock")
+        wait_for(lambda: abs(float(player.input_value()) - holding["time"]) < 0.06, "the player")
+        assert difference(at_first, settled_picture(tab, "#scene")) > 0.02
+        if request.config.getoption("--pictures"):
+            tab.set_viewport_size({"width": 1280, "height": 1240})
+            tab.evaluate("window.scrollTo(0, 0)")
+            settled_picture(tab, "#scene")
+            tab.screenshot(path=root / "docs" / "report.png")
+        axis = Axis(tab, time)
+        assert_allclose(cursors(tab), axis.place(holding["time"]), rtol=0, atol=1.0)
+
+        # So does pointing at a plot, and the scene finds back to what it has shown.
+        third = time[0] + axis.duration / 3.0
+        tab.mouse.move(axis.place(third) + 50.0, axis.middle)
+        tab.mouse.move(axis.place(third), axis.middle)
+        wait_for(lambda: abs(clock(tab) - third) < 0.02, "the clock")
+        wait_for(lambda: abs(float(player.input_value()) - third) < 0.1, "the player")
+        assert_allclose(cursors(tab), axis.place(clock(tab)), rtol=0, atol=1.0)
+        tab.locator("#slider").fill("0")
+        wait_for(lambda: float(player.input_value()) == 0.0, "the player")
+        assert difference(at_first, settled_picture(tab, "#scene")) < 1e-3
+
+
+def test_linked_plots(talos, hurried, tmp_path, monkeypatch):
+    """What the page does without a scene."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    write_page(tmp_path / "report.html", talos, *hurried)
+    time = hurried[1]["time"]
+    with open_page(tmp_path / "report.html") as tab:
+        tab.locator("#clock", has_text="frame 0").wait_for()
+        everything = np.tile(time[[0, -1]], (len(TIME_PLOTS), 1))
+        assert_array_equal(shown_times(tab), everything)
+        path = "document.getElementById('above').data[2].x.length"
+        assert tab.evaluate(path) == len(time)
+
+        # Zooming in one plot zooms all, and the paths seen from above; cursors stay at their time.
+        axis = Axis(tab, time)
+        tab.locator("#slider").fill(str(len(time) // 2))
+        start, end = (time[0] + part * axis.duration for part in (0.4, 0.7))
+        tab.mouse.move(axis.place(start), axis.middle)
+        tab.mouse.down()
+        tab.mouse.move(axis.place(end), axis.middle, steps=5)
+        tab.mouse.up()
+        wait_for(lambda: (np.abs(shown_times(tab) - [start, end]) < 0.02).all(), "the zoom")
+        wait_for(lambda: tab.evaluate(path) < 0.35 * len(time), "the path")
+        tab.locator("#slider").fill(str(len(time) // 2))
+        where = axis.left + axis.width * (time[len(time) // 2] - start) / (end - start)
+        wait_for(lambda: (np.abs(np.array(cursors(tab)) - where) < 5.0).all(), "the cursors")
+        tab.mouse.dblclick(axis.place(start), axis.middle)
+        wait_for(lambda: (shown_times(tab) == everything).all(), "the plots to zoom out")
+
+        # It plays to the end, and stops there.
+        tab.locator("#slider").fill(str(len(time) - 40))
+        tab.locator("#play").click()
+        wait_for(lambda: clock(tab) == pytest.approx(time[-1], abs=1e-3), "the end")
+        assert tab.locator("#play").get_attribute("aria-label") == "Play"
+        tab.locator("body").press("ArrowLeft")
+        wait_for(lambda: clock(tab) == pytest.approx(time[-2], abs=1e-3), "the frame before")
+
+        # On paper it is as wide as that.
+        width = "document.getElementById('forces').querySelector('svg').clientWidth"
+        tab.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+        wait_for(lambda: tab.evaluate(width) == 680, "the plots to fit")
+        tab.evaluate("window.dispatchEvent(new Event('afterprint'))")
+        wait_for(lambda: tab.evaluate(width) > 1000, "the plots to fit")
+
+
+def test_hostile_names(talos, hurried, tmp_path, monkeypatch):
+    """Whatever files call things, it is text."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    q, arrays, summary = hurried
+    names = {name: f"{HOSTILE} {name}" for name in talos.contacts}
+
+    def renamed(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {names.get(key, key): renamed(item) for key, item in value.items()}
+        if isinstance(value, list):
+            return [renamed(item) for item in value]
+        return HOSTILE if isinstance(value, str) and value != "not feasible" else value
+
+    codes = [{**item, "code": f"{item['code']}{HOSTILE}"} for item in summary["reasons"]]
+    hostile = renamed({**summary, "reasons": [], "statuses": {HOSTILE: 318}})
+    hostile["reasons"] = [{**item, "text": HOSTILE, "unit": HOSTILE} for item in codes]
+    hostile["notes"] = [HOSTILE, "\udcff", "\u2028"]
+    robot = dataclasses.replace(
+        talos, contacts={names[name]: settings for name, settings in talos.contacts.items()}
+    )
+    for name, new in names.items():
+        arrays = {
+            key.replace(f"contact.{name}.", f"contact.{new}."): a for key, a in arrays.items()
+        }
+    arrays["status"] = np.full(len(q), HOSTILE)
+    path = tmp_path / "report.html"
+    write_page(path, robot, q, arrays, hostile)
+    with open_page(path) as tab:
+        tab.locator("#clock", has_text="frame 0").wait_for()
+        assert HOSTILE in tab.locator("h1").inner_text()
+        assert HOSTILE in tab.title()
+        assert set(tab.locator("code").all_text_contents()) == {item["code"] for item in codes}
+        assert tab.locator(".notes li").all_inner_texts()[:2] == [HOSTILE, "?"]
+        assert HOSTILE in tab.locator("#clock").inner_text()
+        assert tab.locator("img, main script").count() == 0
+        # Plots shorten names.
+        legend = tab.locator("#forces .legendtext").all_text_contents()
+        assert legend == ["needed"] + 2 * [f"{HOSTILE[:17]}…"]
+        labels = tab.locator("#schedule .ytick").all_text_contents()
+        assert labels == 3 * [f"{HOSTILE[:17]}…"]
+        tab.locator("#schedule .bars path").last.hover(force=True)
+        label = tab.locator("#schedule .hoverlayer .hovertext").first
+        wait_for(lambda: label.count() and HOSTILE in label.text_content(), "the label")
+
+
+# ---- What is in it ----
+
+
+def test_size(hurried_page):
+    """Plotly and viser, which every page has, leave room for half a minute in 12 MB."""
+    assert hurried_page.stat().st_size < 6e6
+
+
+def test_feasible_walk(talos, tmp_path, monkeypatch):
+    """No reason stands open, and what there is not is not there."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    q, arrays, summary = walk_report(talos)
+    write_page(tmp_path / "full.html", talos, q, arrays, summary)
+    arrays = {name: array for name, array in arrays.items() if "measured" not in name}
+    none = {"notes": [], "cutoff_sensitivity": [], "measured": {}, "ground": {}, "cutoff": None}
+    write_page(tmp_path / "bare.html", talos, q, arrays, summary | none)
+    full, bare = ((tmp_path / f"{name}.html").read_text("utf-8") for name in ("full", "bare"))
+    for text in (full, bare):
+        assert '<section class="verdict good"><h2>Feasible</h2><details>' in text
+        assert text.count("<code>") == len(summary["reasons"])
+    for title in ("How it depends on the filter", "Computed against the file's forces"):
+        assert title in full
+        assert title not in bare
+
+
+def test_without_viser(talos, hurried, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    write_page(tmp_path / "report.html", talos, *hurried)
+    assert (
+        "<li>There is no 3D scene: the 3D scene needs viser, which is not installed: "
+        "pip install dynacom[motion].</li>"
+    ) in (tmp_path / "report.html").read_text("utf-8")
+
+
+def test_without_plotly(talos, hurried, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "plotly.offline", None)
+    with pytest.raises(DynacomError, match=r"plotly, which is not .*: pip install dynacom\[motion"):
+        write_page(tmp_path / "report.html", talos, *hurried)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.12345, "0.123 kg"),
+        (-2.0, "−2 kg"),
+        (0.0, "0 kg"),
+        (6.34e-16, "6.34·10<sup>−16</sup> kg"),
+        (None, "–"),
+        (np.nan, "–"),
+    ],
+)
+def test_numbers(value, text):
+    assert page._number(value, "kg").replace("&nbsp;", " ") == text
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.0, "0.0 %"), (0.0004, "&lt; 0.1 %"), (0.05, "5.0 %"), (1.0, "100.0 %")]
+)
+def test_shares(share, text):
+    assert page._percent(share).replace("&nbsp;", " ") == text
