@@ -79,8 +79,12 @@ def test_command(command, tmp_path):
         assert {row["name"].split("/")[0] for row in rows} == {"distributeForce"}
         for row in rows:
             assert set(row) == {"name", "reference", "median_ns", "ratio"}
-            assert row["median_ns"] > 0 and row["ratio"] > 0
-            assert all(text in done.stdout for text in (row["name"], row["reference"]))
+            assert row["median_ns"] > 0 and row["name"] in done.stdout
+            if row["reference"] is None:  # next to the boundary others have no answer
+                assert "/boundary/" in row["name"] and row["ratio"] is None
+            else:
+                assert row["ratio"] > 0 and row["reference"] in done.stdout
+        assert any(row["reference"] for row in rows)
     if "anymal_trot" in command:
         assert re.search(r"Solved +│ 74 ", done.stdout) and re.search(
             r"Relaxed +│ 120 ", done.stdout
