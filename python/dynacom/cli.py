@@ -214,7 +214,8 @@ def analyze(
         clip=clip_name,
     )
     name = Path(clip.name.removesuffix(".gz")).stem
-    files = report.save(out or Path(f"{name}-analysis"), csv=csv, page=page)
+    with Console(stderr=True).status("Writing the results", spinner="line"):
+        files = report.save(out or Path(f"{name}-analysis"), csv=csv, page=page)
     console = Console()
     console.print(summary_table(report.summary))
     for file in files:
