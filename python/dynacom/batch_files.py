@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""The files of a batch: which they are, and where they are while they are read."""
+
+import glob
+import os
+import re
+import stat
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from dynacom.errors import DynacomError
+from dynacom.motion_file import SUFFIXES
+
+_URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
+
+
+def find_motions(
+    paths: str | Path | Iterable[str | Path], out: Path | None = None
+) -> dict[str, str]:
+    """The motion files that paths stand for, in the order of their names.
+
+    Folders are searched for files whose suffix is that of a motion, but not what is hidden in them
+    or lies in `out`. A glob stands for what it matches. URLs, of whatever fsspec opens, may be both.
+
+    Returns:
+        A file's name in results, where it is text whatever its bytes -> the file. Files that are
+        not there are among them, if they are called like a motion.
+
+    Raises:
+        DynacomError: a path is none of a motion, or a folder holds none; fsspec is needed and not
+            installed.
+    """
+    if isinstance(paths, str | Path):
+        paths = [paths]
+    hidden = None if out is None else out.resolve()
+    files: set[str] = set()
+    for path in map(str, paths):
+        found = list(_find_remote(path) if is_url(path) else _find_local(path, hidden))
+        if not found:
+            raise DynacomError(f"{path}: must hold motions ({', '.join(SUFFIXES)}), got none")
+        files.update(found)
+    if not files:
+        raise DynacomError("paths must be files or folders of motions, got none")
+    return {printable(file): file for file in sorted(files)}
+
+
+def printable(text: str) -> str:
+    """The text, with what no UTF-8 can say written in ASCII: names of files may be any bytes."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def is_url(path: str) -> bool:
+    """Whether fsspec has to open it."""
+    return _URL.match(path) is not None
+
+
+@contextmanager
+def local_copy(file: str) -> Iterator[Path]:
+    """The file itself, or a copy of what a URL stands for while it is needed.
+
+    Raises:
+        DynacomError: it is no regular file, which would never end; fsspec is not installed.
+        OSError: it cannot be read.
+    """
+    if not is_url(file):
+        if not stat.S_ISREG(os.stat(file).st_mode):
+            raise DynacomError(f"{file}: must be a file")
+        yield Path(file)
+        return
+    with tempfile.TemporaryDirectory(prefix="dynacom-") as folder:
+        copy = Path(folder, file.rstrip("/").rpartition("/")[2])
+        system, path = _fsspec(file).url_to_fs(file)
+        system.get_file(path, str(copy))
+        yield copy
+
+
+def _find_local(path: str, hidden: Path | None) -> Iterator[str]:
+    is_there = os.path.lexists(path)
+    if os.path.isdir(path):
+        yield from _search(path, hidden)
+    elif is_there or (path.lower().endswith(SUFFIXES) and not glob.has_magic(path)):
+        yield os.path.normpath(path)
+    elif glob.has_magic(path):
+        for match in glob.iglob(path, recursive=True):
+            if os.path.isdir(match):
+                yield from _search(match, hidden)
+            elif match.lower().endswith(SUFFIXES):
+                yield os.path.normpath(match)
+    else:
+        raise DynacomError(f"{path}: must be a file or a folder, which is not there")
+
+
+def _search(folder: str, hidden: Path | None) -> Iterator[str]:
+    for parent, folders, names in os.walk(folder):
+        folders[:] = [
+            name
+            for name in folders
+            if not name.startswith(".")
+            and (hidden is None or Path(parent, name).resolve() != hidden)
+        ]
+        for name in names:
+            path = os.path.normpath(os.path.join(parent, name))
+            if not name.startswith(".") and name.lower().endswith(SUFFIXES):
+                yield path
+
+
+def _find_remote(url: str) -> Iterator[str]:
+    system, path = _fsspec(url).url_to_fs(url)
+    matches = system.glob(path) if glob.has_magic(path) else [path]
+    for match in matches:
+        if not system.isdir(match):
+            yield system.unstrip_protocol(match)
+            continue
+        for file in system.find(match):
+            inside = file[len(match) :].split("/")
+            is_hidden = any(part.startswith(".") for part in inside)
+            if file.lower().endswith(SUFFIXES) and not is_hidden:
+                yield system.unstrip_protocol(file)
+
+
+def _fsspec(url: str) -> Any:
+    try:
+        import fsspec.core
+    except ImportError as error:
+        raise DynacomError(f"{url}: URLs need fsspec: pip install fsspec") from error
+    return fsspec.core
