@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from dynacom.analysis_options import AnalysisOptions
 from dynacom.batch_files import find_motions, is_url
-from dynacom.batch_pool import Done, Task, run_local
+from dynacom.batch_pool import Done, Pool, Task
 from dynacom.batch_row import Job
 from dynacom.errors import DynacomError
 from dynacom.robots import Robot, load_robot
@@ -149,7 +149,6 @@ def run_batch(
     from dynacom.batch_store import Store
 
     out = Path(out)
-    jobs = len(os.sched_getaffinity(0)) if jobs is None else jobs
     _check(engine, jobs, shard, quat, report)
     if report:
         check_reports()
@@ -168,12 +167,15 @@ def run_batch(
                 file = file if is_url(file) else os.path.abspath(file)
                 yield Task(index, name, file, store.known(index))
 
-        run = run_local
         if engine == "ray":
-            from dynacom.batch_ray import run_ray as run
+            from dynacom.batch_ray import RayPool
+
+            pool = RayPool(job, jobs)
+        else:
+            pool = Pool(job, jobs)
         state = BatchProgress(len(files))
         try:
-            for done in run(job, tasks(), jobs):
+            for done in pool.run(tasks()):
                 if done is None:
                     store.tick()
                     continue
@@ -185,6 +187,8 @@ def run_batch(
         except KeyboardInterrupt:
             store.flush()
             raise
+        finally:
+            pool.close()
         store.finish()
         found = overview(store.table)
         links = {}
@@ -202,11 +206,11 @@ def _need_pyarrow() -> None:
 
 
 def _check(
-    engine: str, jobs: int, shard: tuple[int, int] | None, quat: str | None, report: int
+    engine: str, jobs: int | None, shard: tuple[int, int] | None, quat: str | None, report: int
 ) -> None:
     if engine not in ("local", "ray"):
         raise DynacomError(f"engine must be local or ray, got '{engine}'")
-    if jobs < 1:
+    if jobs is not None and jobs < 1:
         raise DynacomError(f"jobs must be at least 1, got {jobs}")
     if report < 0:
         raise DynacomError(f"report must not be negative, got {report}")

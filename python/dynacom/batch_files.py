@@ -22,8 +22,8 @@ def find_motions(
 ) -> dict[str, str]:
     """The motion files that paths stand for, in the order of their names.
 
-    Folders are searched for files whose suffix is that of a motion, but not what is hidden in them
-    or lies in `out`. A glob stands for what it matches. URLs, of whatever fsspec opens, may be both.
+    Folders are searched for files whose suffix is that of a motion, but for what is hidden in them
+    or lies in `out`. A glob stands for what it matches. URLs, of what fsspec opens, may be both.
 
     Returns:
         A file's name in results, where it is text whatever its bytes -> the file. Files that are

@@ -193,4 +193,6 @@ def _table(titles: Iterable[tuple[str, str]], rows: list[str]) -> str:
 
 
 def _number(value: float, text: str | None = None) -> str:
-    return f'<td class="n" data-value="{value!r}">{text or format(value, ".3g")}</td>'
+    # As JavaScript reads it.
+    key = repr(value).replace("inf", "Infinity").replace("nan", "-Infinity")
+    return f'<td class="n" data-value="{key}">{text or format(value, ".3g")}</td>'

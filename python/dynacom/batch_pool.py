@@ -41,23 +41,30 @@ class Done(NamedTuple):
     rows: list[Row] | None
 
 
-def run_local(job: Job, tasks: Iterable[Task], jobs: int) -> Iterator[Done | None]:
-    """Judges files in worker processes, in any order, a few at a time.
+class Pool:
+    """Worker processes. They start when there is something to do, and end with :meth:`close`."""
 
-    Yields:
-        What is done; and None now and then, when nothing is.
+    def __init__(self, job: Job, jobs: int | None) -> None:
+        """Of so many processes; by default of as many as there are cores."""
+        self._job = job
+        self._jobs = jobs or len(os.sched_getaffinity(0))
+        self._workers: list[_Worker] = []
 
-    Raises:
-        DynacomError: workers cannot be started, or cannot write frames.
-    """
-    tasks = iter(tasks)
-    again: deque[Task] = deque()
-    deaths: Counter[int] = Counter()
-    workers: list[_Worker] = []
-    try:
+    def run(self, tasks: Iterable[Task]) -> Iterator[Done | None]:
+        """Judges files, in any order, a few at a time.
+
+        Yields:
+            What is done; and None now and then, when nothing is.
+
+        Raises:
+            DynacomError: workers cannot be started, or cannot write frames.
+        """
+        tasks = iter(tasks)
+        again: deque[Task] = deque()
+        deaths: Counter[int] = Counter()
         while True:
-            _deal(job, workers, again, tasks, jobs)
-            busy = {worker.connection: worker for worker in workers if worker.given}
+            self._deal(again, tasks)
+            busy = {worker.connection: worker for worker in self._workers if worker.given}
             if not busy:
                 return
             ready = wait(list(busy), timeout=_TICK)
@@ -67,38 +74,38 @@ def run_local(job: Job, tasks: Iterable[Task], jobs: int) -> Iterator[Done | Non
                 worker = busy[connection]
                 try:
                     yield worker.receive()
+                    continue
                 except (EOFError, OSError):
-                    workers.remove(worker)
+                    self._workers.remove(worker)
                     how = worker.end()
-                    if not worker.has_started:
-                        raise DynacomError(f"a worker process could not start ({how})") from None
-                    first, *others = worker.given
-                    again.extendleft(reversed(others))
-                    deaths[first.index] += 1
-                    if deaths[first.index] == 1:
-                        again.appendleft(first)
-                    else:
-                        message = f"{first.name}: its worker process died twice ({how})"
-                        yield Done(first.index, [error_row(job, first.name, message)])
-    finally:
-        for worker in workers:
-            worker.end()
+                if not worker.has_started:
+                    raise DynacomError(f"a worker process could not start ({how})")
+                first, *others = worker.given
+                again.extendleft(reversed(others))
+                deaths[first.index] += 1
+                if deaths[first.index] == 1:
+                    again.appendleft(first)
+                else:
+                    message = f"{first.name}: its worker process died twice ({how})"
+                    yield Done(first.index, [error_row(self._job, first.name, message)])
 
+    def close(self) -> None:
+        """Ends the workers, whatever they do."""
+        while self._workers:
+            self._workers.pop().end()
 
-def _deal(
-    job: Job, workers: list["_Worker"], again: deque[Task], tasks: Iterator[Task], jobs: int
-) -> None:
-    """Gives workers something to do, as long as there is something; the first one first."""
-    for ahead in range(1, _AHEAD + 1):
-        for number in range(jobs):
-            if number < len(workers) and len(workers[number].given) >= ahead:
-                continue
-            task = again.popleft() if again else next(tasks, None)
-            if task is None:
-                return
-            if number == len(workers):
-                workers.append(_Worker.start(job))
-            workers[number].give(task)
+    def _deal(self, again: deque[Task], tasks: Iterator[Task]) -> None:
+        """Gives workers something to do, as long as there is something."""
+        for ahead in range(1, _AHEAD + 1):
+            for number in range(self._jobs):
+                if number < len(self._workers) and len(self._workers[number].given) >= ahead:
+                    continue
+                task = again.popleft() if again else next(tasks, None)
+                if task is None:
+                    return
+                if number == len(self._workers):
+                    self._workers.append(_Worker.start(self._job))
+                self._workers[number].give(task)
 
 
 @dataclass
@@ -115,8 +122,8 @@ class _Worker:
         # Neither fork, which copies threads' locks, nor multiprocessing's spawn, which runs the
         # caller's script again.
         code = (
-            f"import sys; sys.path[:] = {[*map(str, sys.path)]!r}; from dynacom.batch_pool import work; "
-            f"work({its.fileno()})"
+            f"import sys; sys.path[:] = {[*map(str, sys.path)]!r}; "
+            f"from dynacom.batch_pool import work; work({its.fileno()})"
         )
         one = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
         process = subprocess.Popen(

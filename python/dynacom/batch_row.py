@@ -138,7 +138,9 @@ class Job:
         }
         columns = list(_COLUMNS)
         for code, (unit, _) in FAULTS.items():
-            columns += [(f"{code}.{name}", t, unit if u is None else u) for name, t, u in _FAULT_COLUMNS]
+            columns += [
+                (f"{code}.{name}", t, unit if u is None else u) for name, t, u in _FAULT_COLUMNS
+            ]
         for contact in self.robot.contacts:
             columns += [(f"contact.{contact}.{name}", t, u) for name, t, u in _CONTACT_COLUMNS]
         columns += _LAST_COLUMNS
@@ -174,7 +176,7 @@ def _jsonable(settings: Any) -> dict[str, Any]:
 
 
 class FramesError(DynacomError):
-    """A table of frames cannot be written: not the clip's fault, and the next will fare no better."""
+    """A table of frames cannot be written: not the clip's fault, nor would the next do better."""
 
 
 class Judge:
@@ -231,9 +233,7 @@ class Judge:
         else:
             yield None, lambda: read_motion(path, robot, **asdict(reading))
 
-    def _judge(
-        self, name: str, clip: str | None, path: Path, read: Callable[[], Clip]
-    ) -> Row:
+    def _judge(self, name: str, clip: str | None, path: Path, read: Callable[[], Clip]) -> Row:
         job = self._job
         clip = None if clip is None else printable(clip)
         frames = None if job.frames is None else _frames_file(job.frames, job.robot, name, clip)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """The folder of a batch: rows are written as they come, and put in order at the end.
 
-    clips.parquet       the table: when the batch has ended
-    parts/*.parquet     rows, as they came
-    frames/             tables of frames, on demand
-    .lock               held by the batch that writes
+clips.parquet       the table: when the batch has ended
+parts/*.parquet     rows, as they came
+frames/             tables of frames, on demand
+.lock               held by the batch that writes
 """
 
 import fcntl
@@ -53,9 +53,7 @@ class Store:
 
     @classmethod
     @contextmanager
-    def open(
-        cls, folder: Path, job: Job, names: Sequence[str], resume: bool
-    ) -> Iterator["Store"]:
+    def open(cls, folder: Path, job: Job, names: Sequence[str], resume: bool) -> Iterator["Store"]:
         """The results in a folder, which nobody else may change meanwhile.
 
         Args:
