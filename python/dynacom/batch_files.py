@@ -44,7 +44,7 @@ def find_motions(
         files.update(found)
     if not files:
         raise DynacomError("paths must be files or folders of motions, got none")
-    return {printable(file): file for file in sorted(files)}
+    return dict(sorted((printable(file), file) for file in files))
 
 
 def printable(text: str) -> str:
@@ -109,10 +109,11 @@ def _search(folder: str, hidden: Path | None) -> Iterator[str]:
 
 def _find_remote(url: str) -> Iterator[str]:
     system, path = _fsspec(url).url_to_fs(url)
-    matches = system.glob(path) if glob.has_magic(path) else [path]
-    for match in matches:
+    is_glob = glob.has_magic(path)
+    for match in system.glob(path) if is_glob else [path]:
         if not system.isdir(match):
-            yield system.unstrip_protocol(match)
+            if not is_glob or match.lower().endswith(SUFFIXES):
+                yield system.unstrip_protocol(match)
             continue
         for file in system.find(match):
             inside = file[len(match) :].split("/")
