@@ -152,6 +152,10 @@ def run_batch(
     _check(engine, jobs, shard, quat, report)
     if report:
         check_reports()
+    if engine == "ray":
+        from dynacom.batch_ray import RayPool, import_ray
+
+        import_ray()
     if not isinstance(robot, Robot):
         robot = load_robot(robot)
     files = find_motions(paths, out)
@@ -167,12 +171,7 @@ def run_batch(
                 file = file if is_url(file) else os.path.abspath(file)
                 yield Task(index, name, file, store.known(index))
 
-        if engine == "ray":
-            from dynacom.batch_ray import RayPool
-
-            pool = RayPool(job, jobs)
-        else:
-            pool = Pool(job, jobs)
+        pool = RayPool(job, jobs) if engine == "ray" else Pool(job, jobs)
         state = BatchProgress(len(files))
         try:
             for done in pool.run(tasks()):

@@ -15,6 +15,8 @@ from dynacom.errors import DynacomError
 from dynacom.motion_file import SUFFIXES
 
 _URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
+# What a batch writes to its folder, which may be that of the motions.
+_RESULTS = ("clips.parquet", "parts", "frames", "reports")
 
 
 def find_motions(
@@ -22,8 +24,9 @@ def find_motions(
 ) -> dict[str, str]:
     """The motion files that paths stand for, in the order of their names.
 
-    Folders are searched for files whose suffix is that of a motion, but for what is hidden in them
-    or lies in `out`. A glob stands for what it matches. URLs, of what fsspec opens, may be both.
+    Folders are searched for files whose suffix is that of a motion, but for what is hidden, and for
+    what a batch writes to `out`. A glob stands for what it matches. URLs, of what fsspec opens, may
+    be both.
 
     Returns:
         A file's name in results, where it is text whatever its bytes -> the file. Files that are
@@ -35,10 +38,10 @@ def find_motions(
     """
     if isinstance(paths, str | Path):
         paths = [paths]
-    hidden = None if out is None else out.resolve()
+    out = None if out is None else out.resolve()
     files: set[str] = set()
     for path in map(str, paths):
-        found = list(_find_remote(path) if is_url(path) else _find_local(path, hidden))
+        found = list(_find_remote(path) if is_url(path) else _find_local(path, out))
         if not found:
             raise DynacomError(f"{path}: must hold motions ({', '.join(SUFFIXES)}), got none")
         files.update(found)
@@ -77,34 +80,31 @@ def local_copy(file: str) -> Iterator[Path]:
         yield copy
 
 
-def _find_local(path: str, hidden: Path | None) -> Iterator[str]:
+def _find_local(path: str, out: Path | None) -> Iterator[str]:
     is_there = os.path.lexists(path)
     if os.path.isdir(path):
-        yield from _search(path, hidden)
+        yield from _search(path, out)
     elif is_there or (path.lower().endswith(SUFFIXES) and not glob.has_magic(path)):
         yield os.path.normpath(path)
     elif glob.has_magic(path):
         for match in glob.iglob(path, recursive=True):
             if os.path.isdir(match):
-                yield from _search(match, hidden)
+                yield from _search(match, out)
             elif match.lower().endswith(SUFFIXES):
                 yield os.path.normpath(match)
     else:
         raise DynacomError(f"{path}: must be a file or a folder, which is not there")
 
 
-def _search(folder: str, hidden: Path | None) -> Iterator[str]:
+def _search(folder: str, out: Path | None) -> Iterator[str]:
     for parent, folders, names in os.walk(folder):
-        folders[:] = [
-            name
-            for name in folders
-            if not name.startswith(".")
-            and (hidden is None or Path(parent, name).resolve() != hidden)
-        ]
+        ours = _RESULTS if out is not None and Path(parent).resolve() == out else ()
+        folders[:] = [name for name in folders if not name.startswith(".") and name not in ours]
         for name in names:
-            path = os.path.normpath(os.path.join(parent, name))
-            if not name.startswith(".") and name.lower().endswith(SUFFIXES):
-                yield path
+            if name.startswith(".") or name in ours:
+                continue
+            if name.lower().endswith(SUFFIXES):
+                yield os.path.normpath(os.path.join(parent, name))
 
 
 def _find_remote(url: str) -> Iterator[str]:

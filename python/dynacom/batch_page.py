@@ -25,13 +25,15 @@ body { font: 15px/1.45 system-ui, sans-serif; margin: 2rem auto; max-width: 72re
 h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
 table { border-collapse: collapse; width: 100%; }
 td, th { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid var(--line);
-  vertical-align: top; overflow-wrap: anywhere; }
-td.n, th.n { text-align: right; overflow-wrap: normal; font-variant-numeric: tabular-nums; }
-.bars td:first-child { width: 16rem; } .bars td.n { width: 8rem; white-space: nowrap; }
+  vertical-align: top; }
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
+.sortable td:first-child { overflow-wrap: anywhere; min-width: 12rem; }
+.sortable td:not(.n) + td { overflow-wrap: anywhere; min-width: 7rem; }
+.bars td:first-child { width: 28rem; } .bars td.n { width: 8rem; white-space: nowrap; }
 .bar { height: .9rem; min-width: 1px; background: var(--bad); border-radius: 2px; }
 .ok { background: var(--ok); } .err { background: var(--err); }
-th button { font: inherit; font-weight: 600; background: none; border: 0; padding: 0;
-  color: inherit; cursor: pointer; }
+th button { font: inherit; font-weight: 600; text-align: inherit; background: none; border: 0;
+  padding: 0; color: inherit; cursor: pointer; }
 th[aria-sort=ascending] button::after { content: " \\2191"; }
 th[aria-sort=descending] button::after { content: " \\2193"; }
 small { opacity: .75; }

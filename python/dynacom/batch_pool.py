@@ -91,6 +91,8 @@ class Pool:
 
     def close(self) -> None:
         """Ends the workers, whatever they do."""
+        for worker in self._workers:
+            worker.connection.close()
         while self._workers:
             self._workers.pop().end()
 

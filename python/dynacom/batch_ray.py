@@ -17,6 +17,22 @@ _BLOCK = 16
 _CORES = 0.5
 
 
+def import_ray() -> Any:
+    """Ray, which tells nobody about it.
+
+    Raises:
+        DynacomError: it is not installed.
+    """
+    for name, value in (("RAY_USAGE_STATS_ENABLED", "0"), ("RAY_BACKEND_LOG_LEVEL", "fatal")):
+        os.environ.setdefault(name, value)
+    try:
+        import ray
+        import ray.data
+    except ImportError as error:
+        raise DynacomError("engine ray needs Ray: pip install dynacom[ray]") from error
+    return ray
+
+
 class RayPool:
     """Actors of Ray, on its cluster if it is connected to one, else on this machine.
 
@@ -33,19 +49,14 @@ class RayPool:
         Raises:
             DynacomError: Ray is not installed.
         """
-        for name, value in (("RAY_USAGE_STATS_ENABLED", "0"), ("RAY_BACKEND_LOG_LEVEL", "fatal")):
-            os.environ.setdefault(name, value)
-        try:
-            import ray
-            import ray.data
-        except ImportError as error:
-            raise DynacomError("engine ray needs Ray: pip install dynacom[ray]") from error
+        ray = import_ray()
         self._job = job
         self._data = ray.data
         self._shut_down = None
         if not ray.is_initialized():
             ray.init(include_dashboard=False, log_to_driver=False, logging_level=logging.ERROR)
             self._shut_down = ray.shutdown
+        logging.getLogger("ray.data").setLevel(logging.ERROR)
         self._jobs = jobs or max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def run(self, tasks: Iterable[Task]) -> Iterator[Done | None]:
@@ -57,10 +68,9 @@ class RayPool:
         items = [{"task": pickle.dumps(tuple(task))} for task in tasks]
         if not items:
             return
-        context = self._data.DataContext.get_current().copy()
-        context.enable_progress_bars = False
-        logging.getLogger("ray.data").setLevel(logging.ERROR)
-        with self._data.DataContext.current(context):
+        context = self._data.DataContext.get_current()
+        bars, context.enable_progress_bars = context.enable_progress_bars, False
+        try:
             blocks = -(-len(items) // _BLOCK)
             dataset = self._data.from_items(items, override_num_blocks=blocks).map_batches(
                 _Actor,
@@ -74,6 +84,8 @@ class RayPool:
                 if isinstance(reply, DynacomError):
                     raise reply
                 yield reply
+        finally:
+            context.enable_progress_bars = bars
 
     def close(self) -> None:
         """Ends Ray, if it was started here."""
