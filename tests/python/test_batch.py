@@ -550,7 +550,8 @@ def test_no_file_larger_than_that(walks, tmp_path, run, frames):
     command = [sys.executable, "-c", code, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout) == (2, "")
-    assert re.fullmatch(rf"dynacom: {out}(/frames)?: cannot be written \(.*\)\n", done.stderr)
+    where = out / "frames" if frames else out
+    assert re.fullmatch(rf"dynacom: {where}: cannot be written \(.*\)\n", done.stderr)
     assert not [p for p in out.rglob("*") if p.is_file() and p.name != ".lock"]
     again = run(*arguments, "--resume")
     assert (again.returncode, again.stderr) == (0, "")
@@ -566,10 +567,11 @@ def test_a_full_disk(walks, tmp_path, frames):
     if subprocess.run(["unshare", "-rm", "sh", "-c", mount], capture_output=True).returncode:
         pytest.skip("no file system can be mounted here")
     command = f"{sys.executable} -m dynacom batch {walks} --robot {ROBOT} --out {disk}/out"
-    frames = " --frames" * frames
+    where = f"{disk}/out/frames" if frames else f"{disk}/out"
+    command += " --frames" * frames
     script = (
-        f"{mount} && {command}{frames}; echo $?; mount -o remount,size=16m {disk} && "
-        f"{command}{frames} --resume; echo $?"
+        f"{mount} && {command}; echo $?; mount -o remount,size=16m {disk} && "
+        f"{command} --resume; echo $?"
     )
     done = subprocess.run(
         ["unshare", "-rm", "sh", "-c", script], capture_output=True, text=True, timeout=120
@@ -577,7 +579,7 @@ def test_a_full_disk(walks, tmp_path, frames):
     assert done.stdout.startswith("2\n")
     assert done.stdout.endswith("\n0\n")
     assert re.fullmatch(
-        rf"dynacom: {disk}/out(/frames)?: cannot be written \([^\n]*No space left[^\n]*\)\n",
+        rf"dynacom: {where}: cannot be written \([^\n]*No space left[^\n]*\)\n",
         done.stderr,
     )
 
