@@ -40,7 +40,7 @@ class Store:
         self._index = {name: index for index, name in enumerate(names)}
         #: Of each file, the part that has its rows; -1 where there is none.
         self._part_of = np.full(len(names), -1, dtype=np.int32)
-        self._digests: dict[int, str] = {}
+        self._digests: dict[int, str | None] = {}
         self._number = 0
         self._rows: list[Row] = []
         self._waiting: list[int] = []
@@ -81,7 +81,7 @@ class Store:
             os.close(lock)
 
     def known(self, index: int) -> str | None:
-        """The SHA-256 of a file, in its contents of which the rows are known."""
+        """The SHA-256 of a file whose rows are known; None if it had none, or killed its worker."""
         return self._digests.get(index)
 
     def add(self, index: int, rows: list[Row]) -> None:
@@ -200,8 +200,7 @@ class Store:
             except pyarrow.ArrowInvalid:
                 continue  # the machine has crashed
             for name, digest in zip(*(column.to_pylist() for column in table), strict=True):
-                # Without a digest there was no file, or no worker that survived it.
-                if digest is not None and (index := self._index.get(name)) is not None:
+                if (index := self._index.get(name)) is not None:
                     self._digests[index] = digest
                     self._part_of[index] = number
 

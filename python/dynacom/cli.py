@@ -454,7 +454,6 @@ def _batch_progress() -> Iterator[Callable[["dynacom.BatchProgress"], None]]:
     columns = (
         TextColumn("Judging"),
         BarColumn(),
-        TextColumn("{task.completed}/{task.total} files"),
         TextColumn("{task.description}"),
         TimeRemainingColumn(),
     )
@@ -463,11 +462,11 @@ def _batch_progress() -> Iterator[Callable[["dynacom.BatchProgress"], None]]:
     def show(state: "dynacom.BatchProgress") -> None:
         elapsed = max(time.monotonic() - start, 1e-3)
         text = (
-            f"{state.clips / elapsed:.1f} clips/s, {state.frames / elapsed:.0f} frames/s, "
-            f"{state.errors} errors"
+            f"{state.done}/{state.files} files, {state.clips / elapsed:.1f} clips/s, "
+            f"{state.frames / elapsed:.0f} frames/s, {state.errors} errors"
         )
         bar.update(task, completed=state.done, total=state.files, description=text)
 
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("", total=None)
+        task = bar.add_task("", total=1)
         yield show
