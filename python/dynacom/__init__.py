@@ -3,7 +3,8 @@
 
 The classes and functions are those of the C++ library, under the same names and with the same
 keyword arguments; arrays are copied on their way in and out. Robots and motions are read from files
-by :func:`load_robot` and :func:`read_motion`; :func:`analyze` judges a motion as a whole.
+by :func:`load_robot` and :func:`read_motion`; :func:`analyze` judges a motion as a whole, and
+:func:`batch` many.
 """
 
 # First: it registers the types of Pinocchio and eigenpy that the bindings take and return.
@@ -11,6 +12,7 @@ import pinocchio  # noqa: F401  isort: skip
 
 from dynacom import compat as _compat
 from dynacom.analysis_options import AnalysisOptions
+from dynacom.batch import BatchProgress, batch
 from dynacom.dynacom_pywrap import (
     CentroidalState,
     CentroidalWrench,
@@ -63,6 +65,7 @@ _compat.add_aliases()
 
 __all__ = [
     "AnalysisOptions",
+    "BatchProgress",
     "CentroidalState",
     "CentroidalWrench",
     "Clip",
@@ -96,6 +99,7 @@ __all__ = [
     "analyze",
     "analyzeMotion",
     "applyGroundWrench",
+    "batch",
     "compareDerivatives",
     "computeCentroidalState",
     "computeContactMotions",

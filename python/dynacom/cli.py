@@ -267,6 +267,105 @@ def show(
     )
 
 
+@app.command()
+def batch(
+    paths: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="PATHS...",
+            help="Motions: files, folders to search, globs, URLs (s3://...), see docs/batch.md.",
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(metavar="DIR", help="Folder for the results, made if it is not there."),
+    ],
+    robot: _RobotName = None,
+    urdf: _Urdf = None,
+    contact: _Contacts = None,
+    payload: _Payloads = None,
+    fps: _Fps = None,
+    quat: _Quat = None,
+    trust: _Trust = False,
+    cutoff: _Cutoff = None,
+    ground_height: _Ground = None,
+    flat: _Flat = None,
+    omega: _Omega = None,
+    settings: _SettingsFile = None,
+    set_: _Set = None,
+    engine: Annotated[
+        str, typer.Option(metavar="local|ray", help="Processes of this machine, or Ray Data.")
+    ] = "local",
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", help="Processes; by default one per core.")
+    ] = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="I/N", help="The Ith of N parts of the files only.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the batch in DIR: only what is left.")
+    ] = False,
+    frames: Annotated[
+        bool, typer.Option("--frames", help="Write the table of each clip's frames, too.")
+    ] = False,
+    report: Annotated[
+        int, typer.Option(metavar="N", help="Write a report of each of the N worst clips.")
+    ] = 0,
+) -> None:
+    """Judge many motions: a row per clip, whatever the clip.
+
+    Writes DIR/clips.parquet and DIR/index.html, and prints a summary.
+    """
+    from rich.console import Console
+
+    from dynacom.batch import BatchProgress, run_batch
+    from dynacom.summary import overview_table
+
+    state = BatchProgress(0)
+
+    def keep(now: BatchProgress) -> None:
+        nonlocal state
+        state = now
+        show(now)
+
+    try:
+        with _batch_progress() as show:
+            found = run_batch(
+                paths,
+                _load_robot(robot, urdf, contact, payload),
+                out,
+                options=_make_options(settings, set_, cutoff, ground_height, flat, omega),
+                fps=fps,
+                quat=quat,
+                trust=trust,
+                engine=engine,
+                jobs=jobs,
+                shard=None if shard is None else _parse_shard(shard),
+                resume=resume,
+                frames=frames,
+                report=report,
+                progress=keep,
+            )
+    except KeyboardInterrupt:
+        typer.echo(
+            f"dynacom: interrupted when {state.done} of {state.files} files were done: the same "
+            "command with --resume goes on",
+            err=True,
+        )
+        raise typer.Exit(130) from None
+    console = Console()
+    console.print(overview_table(found, state))
+    for name in ("clips.parquet", "index.html"):
+        console.print(f"Wrote {out / name}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _parse_shard(text: str) -> tuple[int, int]:
+    part, slash, parts = text.partition("/")
+    if not (slash and part.isdecimal() and parts.isdecimal()):
+        raise DynacomError(f"shard must be i/n with i from 1 to n, got {text}")
+    return int(part), int(parts)
+
+
 def _analyze(motion, robot, schedule, options, **reading) -> "dynacom.MotionReport":
     with _progress() as progress:
         return dynacom.analyze(
@@ -338,3 +437,36 @@ def _progress() -> Iterator[Callable[[float], None]]:
     ) as bar:
         task = bar.add_task("", total=1.0)
         yield lambda part: bar.update(task, completed=part)
+
+
+@contextmanager
+def _batch_progress() -> Iterator[Callable[["dynacom.BatchProgress"], None]]:
+    """A progress bar on stderr, if that is a terminal: a function that takes how far it is."""
+    import time
+
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda state: None
+        return
+    columns = (
+        TextColumn("Judging"),
+        BarColumn(),
+        TextColumn("{task.description}"),
+        TimeRemainingColumn(),
+    )
+    start = time.monotonic()
+
+    def show(state: "dynacom.BatchProgress") -> None:
+        elapsed = max(time.monotonic() - start, 1e-3)
+        text = (
+            f"{state.done}/{state.files} files, {state.clips / elapsed:.1f} clips/s, "
+            f"{state.frames / elapsed:.0f} frames/s, {state.errors} errors"
+        )
+        bar.update(task, completed=state.done, total=state.files, description=text)
+
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=1)
+        yield show

@@ -25,6 +25,9 @@ _READERS = {
     ".joblib": read_pickle,
 }
 
+#: How the names of files end that can be read.
+SUFFIXES = tuple(_READERS)
+
 
 def read_motion(
     path: str | Path,

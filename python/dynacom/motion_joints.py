@@ -3,6 +3,7 @@
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -36,11 +37,16 @@ def urdf_order(robot: Robot) -> tuple[str, ...]:
 
 def _names_in_urdf(path: Path) -> tuple[str, ...]:
     try:
-        return tuple(
-            joint.get("name", "") for joint in ElementTree.parse(path).getroot().findall("joint")
-        )
+        return _read_names(path, path.stat().st_mtime_ns)
     except (OSError, ElementTree.ParseError) as error:
         raise DynacomError(f"{path}: cannot be read ({error})") from error
+
+
+@lru_cache(maxsize=16)
+def _read_names(path: Path, changed: int) -> tuple[str, ...]:
+    """Once for many motions, as long as the file has not changed."""
+    root = ElementTree.parse(path).getroot()
+    return tuple(joint.get("name", "") for joint in root.findall("joint"))
 
 
 def tree_orders(robot: Robot) -> dict[str, tuple[str, ...]]:

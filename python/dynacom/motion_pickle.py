@@ -8,7 +8,8 @@ stand-ins of this module, so that no reader of NumPy's sees what the file says.
 
 import pickle
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,8 +40,30 @@ def read_pickle(path: Path, robot: Robot, options: Options) -> Clip:
             arrays and is not trusted, or joblib, which such a file needs, is not installed.
         OSError: the file cannot be read.
     """
-    content = _choose(path, _load(path, options.trust), options.clip)
+    return _read(path, _choose(path, _load(path, options.trust), options.clip), robot, options)
 
+
+def read_clips(
+    path: Path, robot: Robot, options: Options
+) -> Iterator[tuple[str | None, Callable[[], Clip]]]:
+    """Loads such a file once, for all the clips that it holds.
+
+    Yields:
+        The name of a clip, None where there is but one, and a function that makes the clip, or
+        raises DynacomError.
+
+    Raises:
+        DynacomError, OSError: as :func:`read_pickle`.
+    """
+    content = _load(path, options.trust)
+    if _holds_clips(content) and len(content) > 1:
+        for name, inner in content.items():
+            yield str(name), partial(_read, path, inner, robot, options)
+    else:
+        yield None, partial(_read, path, _choose(path, content, None), robot, options)
+
+
+def _read(path: Path, content: Mapping[str, Any], robot: Robot, options: Options) -> Clip:
     position = _numbers(path, content, "position", 3)
     quaternion = _numbers(path, content, "quaternion", 4)
     joints = _numbers(path, content, "joints", None)
@@ -216,11 +239,7 @@ def _choose(path: Path, content: Any, clip: str | None) -> Mapping[str, Any]:
         if clip is not None:
             raise DynacomError(f"{path}: is one clip without a name, got clip '{clip}'")
         return content
-    if not (
-        isinstance(content, dict)
-        and content
-        and all(isinstance(inner, dict) and _find(inner, "joints") for inner in content.values())
-    ):
+    if not _holds_clips(content):
         got = (
             f"the keys {brief([str(key) for key in content]) or 'none'}"
             if isinstance(content, dict)
@@ -238,6 +257,15 @@ def _choose(path: Path, content: Any, clip: str | None) -> Mapping[str, Any]:
         choice = "choose one with --clip" if clip is None else f"got clip '{clip}'"
         raise DynacomError(f"{path}: holds {what}: {choice}")
     return next(inner for name, inner in content.items() if str(name) == clip)
+
+
+def _holds_clips(content: Any) -> bool:
+    """Whether it is clips by name."""
+    return (
+        isinstance(content, dict)
+        and len(content) > 0
+        and all(isinstance(inner, dict) and _find(inner, "joints") for inner in content.values())
+    )
 
 
 def _find(content: Mapping[str, Any], what: str) -> str | None:

@@ -92,7 +92,8 @@ _EVEN = 0.1
 # From which height on a ground is worth a question: most files have theirs at zero [m].
 _FAR_FROM_ZERO = 0.1
 
-_FAULTS = {
+#: What may be wrong with a motion: code -> unit of its worst value, and what it means.
+FAULTS = {
     "residual_force": ("m g", "the contacts cannot give the force"),
     "residual_torque": ("m g m", "the contacts cannot give the moment"),
     "flight_with_support_needed": ("m g", "no contact is active, but the motion needs support"),
@@ -238,6 +239,7 @@ def analyze(
     clip: str | None = None,
     schedule: str | Path | ContactSchedule | None = None,
     options: AnalysisOptions | None = None,
+    sensitivity: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> MotionReport:
     """Judges a motion: what the ground must give, what its contacts can, and whether that suffices.
@@ -252,6 +254,8 @@ def analyze(
         fps, quat, trust, clip: as in :func:`read_motion`.
         schedule: a file, see docs/verdict.md, or a schedule with T frames.
         options: settings; their defaults by default.
+        sensitivity: whether to judge the motion with half and twice the cut-off, too, which takes
+            three times as long.
         progress: called now and then with what part of the work is done.
 
     Raises:
@@ -267,7 +271,8 @@ def analyze(
     if not isinstance(motion, Clip):
         motion = read_motion(motion, robot, fps=fps, quat=quat, trust=trust, clip=clip)
     try:
-        return _analyze(motion, robot, schedule, options, progress or (lambda part: None))
+        report = progress or (lambda part: None)
+        return _analyze(motion, robot, schedule, options, sensitivity, report)
     except ValueError as error:
         raise DynacomError(f"{motion.path}: {error}") from error
 
@@ -287,6 +292,7 @@ def _analyze(
     robot: Robot,
     schedule: str | Path | ContactSchedule | None,
     options: AnalysisOptions,
+    sensitive: bool,
     progress: Callable[[float], None],
 ) -> MotionReport:
     derived = _derive(clip, robot, options.cutoff)
@@ -297,7 +303,7 @@ def _analyze(
     dynamics.setGroundHeight(float(ground.mean()))
 
     # The motion itself, and with other cut-offs how much hangs on that.
-    others = _other_cutoffs(clip, derived.cutoff)
+    others = _other_cutoffs(clip, derived.cutoff) if sensitive else []
     work = (1 + len(others)) * len(clip.time)
 
     def judge(motion: Motion, done: int) -> tuple[MotionAnalysis, MotionVerdict]:
@@ -335,6 +341,7 @@ def _analyze(
 
     arrays = _collect_arrays(clip, analysis, contacts, ground)
     unexplained = _unexplained(clip, analysis, verdict)
+    rms_force, rms_torque = _residual_rms(analysis, weight)
     notes = [
         *clip.notes,
         derived.text,
@@ -355,6 +362,8 @@ def _analyze(
         "codes": _codes(verdict),
         "reasons": _reasons(verdict, options, len(clip.time)),
         "statuses": dict(Counter(status.name for status in analysis.status)),
+        "residual_force_rms": rms_force,
+        "residual_torque_rms": rms_torque,
         "notes": notes,
         "derivatives": derived.text,
         "cutoff": derived.cutoff,
@@ -362,7 +371,7 @@ def _analyze(
         "ground": dict(zip(robot.contacts, ground.tolist(), strict=True)),
         "contacts": {c.name: _summarize_contact(c, weight) for c in analysis.contacts},
         "mean_vertical_force": float(analysis.ground_force[:, 2].mean() / weight),
-        "momentum_change": _momentum_change(analysis, dynamics.getMass()) / weight,
+        "momentum_change": float(_momentum_change(analysis, dynamics.getMass()) / weight),
         "unexplained": unexplained,
         "measured": _compare_forces(clip, analysis),
         "options": options.to_dict(),
@@ -558,7 +567,7 @@ def _codes(verdict: MotionVerdict) -> list[str]:
 def _reasons(verdict: MotionVerdict, options: AnalysisOptions, frames: int) -> list[dict[str, Any]]:
     reasons = []
     for code, finding in verdict.findings.items():
-        unit, text = _FAULTS[code]
+        unit, text = FAULTS[code]
         limit = getattr(options.verdict, code)
         share = finding.frames / frames
         if finding.frames:
@@ -583,12 +592,18 @@ def _reasons(verdict: MotionVerdict, options: AnalysisOptions, frames: int) -> l
     return reasons
 
 
+def _residual_rms(analysis: MotionAnalysis, weight: float) -> tuple[float, float]:
+    """Of the force [m g], and of the moment about the CoM [m g m]."""
+    norms = np.linalg.norm(analysis.residual.reshape(-1, 2, 3), axis=2) / weight
+    force, torque = np.sqrt((norms**2).mean(axis=0)).tolist()
+    return force, torque
+
+
 def _residuals(
     cutoff: float, analysis: MotionAnalysis, verdict: MotionVerdict, weight: float
 ) -> dict[str, Any]:
-    norms = np.linalg.norm(analysis.residual.reshape(-1, 2, 3), axis=2) / weight
+    rms_force, rms_torque = _residual_rms(analysis, weight)
     relaxed = [status.name == "Relaxed" for status in analysis.status]
-    rms_force, rms_torque = np.sqrt((norms**2).mean(axis=0)).tolist()
     return {
         "cutoff": cutoff,
         "residual_force_rms": rms_force,

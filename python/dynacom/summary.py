@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: BSD-2-Clause
-"""The summary of a motion, to be printed."""
+"""Summaries of a motion, and of many, to be printed."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 from rich.table import Table
+
+if TYPE_CHECKING:
+    from dynacom.batch import BatchProgress
+    from dynacom.batch_overview import Overview
 
 
 def summary_table(summary: dict[str, Any]) -> Table:
@@ -56,4 +60,32 @@ def summary_table(summary: dict[str, Any]) -> Table:
         table.add_section()
         for note in summary["notes"]:
             table.add_row("Note", escape(note))
+    return table
+
+
+def overview_table(found: "Overview", state: "BatchProgress") -> Table:
+    """What a batch found, and how much of it was new, as a table of two columns."""
+    table = Table(show_header=False)
+    table.add_column(style="bold", overflow="fold")
+    table.add_column(overflow="fold")
+
+    def share(count: int) -> str:
+        return f"{count} ({count / found.clips:.1%})" if found.clips else "0"
+
+    table.add_row("Clips", str(found.clips))
+    table.add_row("  feasible", f"[green]{share(found.feasible)}[/]")
+    table.add_row("  not feasible", f"[red]{share(found.not_feasible)}[/]")
+    table.add_row("  errors", share(found.errors))
+    table.add_section()
+    for code, count in found.codes.most_common():
+        if count:
+            table.add_row(code, share(count))
+    table.add_section()
+    table.add_row("Motion", f"{found.duration:.1f} s, {found.frames} frames")
+    if state.known:
+        table.add_row("Known before", f"{state.known} of {state.files} files")
+    for row in found.failed[:5]:
+        table.add_row("Error", escape(row["error"]))
+    if found.errors > 5:
+        table.add_row("", f"{found.errors - 5} more are in index.html and in clips.parquet")
     return table

@@ -51,6 +51,8 @@ SUMMARY = [
     "codes",
     "reasons",
     "statuses",
+    "residual_force_rms",
+    "residual_torque_rms",
     "notes",
     "derivatives",
     "cutoff",

@@ -68,6 +68,7 @@ def objects(talos, talos_standing, talos_motion):
         dynacom.VerdictSettings(),
         dynacom.FaultLimit(0.1, 0.2),
         dynacom.AnalysisOptions(),
+        dynacom.BatchProgress(3, 1),
         report.clip,
         report,
         report.verdict,

@@ -1,0 +1,360 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""What a batch finds of a clip: one row, see docs/batch.md."""
+
+import hashlib
+import json
+import os
+import secrets
+import time
+import urllib.parse
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from dynacom.analysis_options import AnalysisOptions
+from dynacom.batch_files import local_copy, printable
+from dynacom.dynacom_pywrap import Contact6DSettings, ContactPointSettings, __version__
+from dynacom.errors import DynacomError
+from dynacom.motion_clip import Options
+from dynacom.motion_file import Clip, read_motion
+from dynacom.motion_pickle import read_clips
+from dynacom.motion_report import FAULTS, MotionReport, analyze
+from dynacom.robots import Robot
+
+if TYPE_CHECKING:
+    import pyarrow
+
+Row = dict[str, Any]
+
+# Column's name, Arrow's type, unit. docs/batch.md says what they are.
+_COLUMNS = (
+    ("file", "string", ""),
+    ("clip", "string", ""),
+    ("sha256", "string", ""),
+    ("robot", "string", ""),
+    ("status", "string", ""),
+    ("error", "string", ""),
+    ("verdict", "string", ""),
+    ("feasible", "bool", ""),
+    ("codes", "list<string>", ""),
+    ("severity", "double", ""),
+    ("frames", "int64", ""),
+    ("duration", "double", "s"),
+    ("frame_rate", "double", "Hz"),
+    ("mass", "double", "kg"),
+    ("omega", "double", "rad/s"),
+    ("cutoff", "double", "Hz"),
+    ("mean_vertical_force", "double", "m g"),
+    ("momentum_change", "double", "m g"),
+    ("residual_force_rms", "double", "m g"),
+    ("residual_torque_rms", "double", "m g m"),
+    ("solved_share", "double", ""),
+    ("relaxed_share", "double", ""),
+    ("no_contact_share", "double", ""),
+)
+_FAULT_COLUMNS = (
+    ("holds", "bool", ""),
+    ("frames", "int64", ""),
+    ("worst", "double", None),
+    ("time", "double", "s"),
+)
+_CONTACT_COLUMNS = (
+    ("active_share", "double", ""),
+    ("weight_share", "double", ""),
+    ("weight_share_while_active", "double", ""),
+    ("largest_vertical_force", "double", "m g"),
+    ("largest_friction_usage", "double", ""),
+    ("least_cop_margin", "double", "m"),
+    ("ground", "double", "m"),
+)
+_LAST_COLUMNS = (
+    ("seconds", "double", "s"),
+    ("dynacom", "string", ""),
+)
+_STATUSES = {"Solved": "solved", "Relaxed": "relaxed", "NoContact": "no_contact"}
+_MEASURED = tuple(
+    f"measured_{part}_{axis}" for part in ("force", "torque") for axis in ("x", "y", "z")
+)
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is done with every clip. It can be sent to another process."""
+
+    robot: Robot
+    options: AnalysisOptions
+    fps: float | None = None
+    quat: str | None = None
+    trust: bool = False
+    #: Where the tables of frames go; None for nowhere.
+    frames: Path | None = None
+
+    def __reduce__(self) -> tuple:
+        robot = self.robot
+        contacts = {
+            name: (type(settings) is Contact6DSettings, _fields(settings))
+            for name, settings in robot.contacts.items()
+        }
+        parts = (robot.name, robot.model, contacts, robot.urdf, robot.default, robot.joint_layouts)
+        options = self.options.to_dict()
+        return _make_job, (parts, options, self.fps, self.quat, self.trust, self.frames)
+
+    def settings(self) -> dict[str, Any]:
+        """All that results depend on, but for the files: it can be written as JSON."""
+        robot = self.robot
+        return {
+            "dynacom": __version__,
+            "robot": robot.name,
+            "model": hashlib.sha256(robot.model.saveToString().encode()).hexdigest(),
+            "default": robot.default.tolist(),
+            "joint_layouts": robot.joint_layouts,
+            "contacts": {name: _jsonable(s) for name, s in robot.contacts.items()},
+            "options": self.options.to_dict(),
+            "fps": self.fps,
+            "quat": self.quat,
+            "trust": self.trust,
+            "frames": self.frames is not None,
+        }
+
+    def key(self) -> str:
+        """Differs where the settings differ."""
+        text = json.dumps(self.settings(), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def schema(self) -> "pyarrow.Schema":
+        """Of the table: its columns are those of docs/batch.md."""
+        import pyarrow
+
+        types = {
+            "string": pyarrow.string(),
+            "bool": pyarrow.bool_(),
+            "int64": pyarrow.int64(),
+            "double": pyarrow.float64(),
+            "list<string>": pyarrow.list_(pyarrow.string()),
+        }
+        columns = list(_COLUMNS)
+        for code, (unit, _) in FAULTS.items():
+            columns += [
+                (f"{code}.{name}", t, unit if u is None else u) for name, t, u in _FAULT_COLUMNS
+            ]
+        for contact in self.robot.contacts:
+            columns += [(f"contact.{contact}.{name}", t, u) for name, t, u in _CONTACT_COLUMNS]
+        columns += _LAST_COLUMNS
+        fields = [
+            pyarrow.field(name, types[t], metadata={"unit": unit}) for name, t, unit in columns
+        ]
+        metadata = {"dynacom.key": self.key(), "dynacom.settings": json.dumps(self.settings())}
+        return pyarrow.schema(fields, metadata)
+
+
+def _make_job(parts: tuple, options: dict[str, Any], *others: Any) -> Job:
+    name, model, contacts, urdf, default, layouts = parts
+    made = {}
+    for contact, (is_6d, values) in contacts.items():
+        made[contact] = settings = Contact6DSettings() if is_6d else ContactPointSettings()
+        for key, value in values.items():
+            setattr(settings, key, value)
+    own = AnalysisOptions()
+    own.update(options, "options")
+    return Job(Robot(name, model, made, urdf, default, layouts), own, *others)
+
+
+def _fields(settings: Any) -> dict[str, Any]:
+    names = [name for name, value in vars(type(settings)).items() if isinstance(value, property)]
+    return {name: getattr(settings, name) for name in names}
+
+
+def _jsonable(settings: Any) -> dict[str, Any]:
+    return {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in _fields(settings).items()
+    }
+
+
+class FramesError(DynacomError):
+    """A table of frames cannot be written: not the clip's fault, nor would the next do better."""
+
+
+class Judge:
+    """Analyses clips, one after the other, and has no memory of them."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._reading = Options(job.fps, job.quat, job.trust)
+
+    def __call__(self, name: str, file: str, known: str | None) -> list[Row] | None:
+        """The rows of a file: one per clip in it, whatever it holds.
+
+        Args:
+            name: the file's in results.
+            file: a path or a URL.
+            known: the SHA-256 of a file of which the rows are known already.
+
+        Returns:
+            The rows, or None if that is this file.
+
+        Raises:
+            FramesError: what was found cannot be written.
+        """
+        start = time.perf_counter()
+        path = Path(file)
+        digest = None
+        rows: list[Row] = []
+        try:
+            with local_copy(file) as path:
+                with path.open("rb") as opened:
+                    digest = _digest(opened)
+                if digest == known:
+                    return None
+                for clip, read in self._clips(path):
+                    found = self._judge(name, clip, path, read)
+                    rows.append(found | {"sha256": digest, "seconds": time.perf_counter() - start})
+                    start = time.perf_counter()
+        except FramesError:
+            raise
+        except Exception as error:  # whatever the file made any library raise
+            message = _message(error, name, path)
+            rows.append(
+                error_row(self._job, name, message)
+                | {"sha256": digest, "seconds": time.perf_counter() - start}
+            )
+        return rows
+
+    def _clips(self, path: Path) -> Iterator[tuple[str | None, Callable[[], Clip]]]:
+        """The clips of a file by name: None for one that is alone."""
+        robot, reading = self._job.robot, self._reading
+        if path.suffix.lower() in (".pkl", ".pickle", ".joblib") and path.is_file():
+            with np.errstate(all="ignore"):
+                yield from read_clips(path, robot, reading)
+        else:
+            yield None, lambda: read_motion(path, robot, **asdict(reading))
+
+    def _judge(self, name: str, clip: str | None, path: Path, read: Callable[[], Clip]) -> Row:
+        job = self._job
+        clip = None if clip is None else printable(clip)
+        frames = None if job.frames is None else _frames_file(job.frames, job.robot, name, clip)
+        try:
+            with np.errstate(all="ignore"):
+                report = analyze(read(), job.robot, options=job.options, sensitivity=False)
+            row = _report_row(report, name)
+        except Exception as error:
+            if frames is not None:
+                with suppress(OSError):
+                    frames.unlink()  # of the file as it was before
+            return error_row(job, name, _message(error, name, path)) | {"clip": clip}
+        if frames is not None:
+            _write_frames(report, name, clip, frames, job.frames)
+        return row | {"clip": clip}
+
+
+def _digest(file: BinaryIO) -> str:
+    digest = hashlib.sha256()
+    while block := file.read(1 << 20):
+        digest.update(block)
+    return digest.hexdigest()
+
+
+def error_row(job: Job, name: str, message: str) -> Row:
+    """The row of a clip that could not be judged."""
+    return {
+        "file": name,
+        "robot": printable(job.robot.name),
+        "status": "error",
+        "error": message,
+        "dynacom": __version__,
+    }
+
+
+def _message(error: Exception, name: str, path: Path) -> str:
+    """One line."""
+    if isinstance(error, OSError):
+        text = f"{name}: cannot be read ({error.strerror or error})"
+    elif isinstance(error, DynacomError):
+        text = str(error)
+    else:
+        text = f"{name}: {type(error).__name__}: {error}"
+    # A copy's name says nothing.
+    text = printable(text.replace(str(path), name))
+    return " ".join(text.split())
+
+
+def _report_row(report: MotionReport, name: str) -> Row:
+    summary = report.summary
+    row = {key: summary[key] for key, _, _ in _COLUMNS if key in summary}
+    row |= {
+        "file": name,
+        "robot": printable(report.robot.name),
+        "status": "ok",
+        "feasible": report.verdict.feasible,
+        "severity": max((r["share"] for r in summary["reasons"] if r["holds"]), default=0.0),
+        "dynacom": __version__,
+    }
+    for status, prefix in _STATUSES.items():
+        row[f"{prefix}_share"] = summary["statuses"].get(status, 0) / summary["frames"]
+    for reason in summary["reasons"]:
+        for column, _, _ in _FAULT_COLUMNS:
+            row[f"{reason['code']}.{column}"] = reason[column]
+    for contact, found in summary["contacts"].items():
+        found = found | {"ground": summary["ground"][contact]}
+        for column, _, _ in _CONTACT_COLUMNS:
+            row[f"contact.{contact}.{column}"] = found[column]
+    return row
+
+
+# Frames.
+
+
+def _frames_file(folder: Path, robot: Robot, name: str, clip: str | None) -> Path:
+    """Where a clip's table lies: partitioned, since folders of a million files serve nobody."""
+    text = name if clip is None else f"{name}\0{clip}"
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    robot_name = urllib.parse.quote(printable(robot.name), safe="")
+    # Letters only: some buckets alone would be read as numbers.
+    bucket = "".join("abcdefghijklmnop"[int(digit, 16)] for digit in digest[:2])
+    return folder / f"robot={robot_name}" / f"bucket={bucket}" / f"{digest[:32]}.parquet"
+
+
+def _write_frames(
+    report: MotionReport, name: str, clip: str | None, path: Path, folder: Path
+) -> None:
+    import pyarrow
+    import pyarrow.parquet
+
+    count = len(report.arrays["time"])
+    columns = report.columns()
+    # The same columns for every clip of a robot.
+    nothing = np.full(count, np.nan)
+    for contact in report.robot.contacts:
+        for ending in _MEASURED:
+            unit = "N" if "force" in ending else "N m"
+            columns.setdefault(f"contact.{contact}.{ending}", (nothing, unit))
+    fields, arrays = [], []
+    texts = {"file": name, "clip": clip}
+    for title, text in texts.items():
+        values = pyarrow.array([text] * count, pyarrow.string()).dictionary_encode()
+        fields.append(pyarrow.field(title, values.type))
+        arrays.append(values)
+    fields.append(pyarrow.field("frame", pyarrow.int64()))
+    arrays.append(pyarrow.array(np.arange(count)))
+    contacts = [column for column in columns if column.startswith("contact.")]
+    names = [column for column in columns if column not in set(contacts)] + sorted(contacts)
+    for column in names:
+        values, unit = columns[column]
+        array = pyarrow.array(values.tolist() if values.dtype.kind == "U" else values)
+        fields.append(pyarrow.field(column, array.type, metadata={"unit": unit}))
+        arrays.append(array)
+    temporary = folder / ".writing" / f"{path.stem}-{secrets.token_hex(4)}.parquet"
+    try:
+        for parent in (path.parent, temporary.parent):
+            parent.mkdir(parents=True, exist_ok=True)
+        table = pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields))
+        pyarrow.parquet.write_table(table, temporary)
+        os.replace(temporary, path)
+    except OSError as error:
+        with suppress(OSError):
+            temporary.unlink()
+        raise FramesError(f"{folder}: cannot be written ({error.strerror or error})") from error

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""Small clips of ANYmal for the tests of batches, and files that are none."""
+
+import gzip
+import os
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pyarrow
+
+from dynacom.robots import Robot
+from helpers import WALKS
+
+#: Contents of broken files by name -> a part of the error.
+BROKEN = {
+    "empty.csv": (b"", "empty file"),
+    "empty.npz": (b"", "empty.npz"),
+    "header.csv": (b"t,root_x\n1,2\n", "missing column"),
+    "text.csv": (b"hello\nworld\n", "must be a number"),
+    "narrow.csv": (b"1,2,3\n1,2,3\n", "columns"),
+    "ragged.csv": (b"1,2,3\n1,2\n", "columns"),
+    "zip.npz": (b"PK\x03\x04 and no more", "zip.npz"),
+    "bytes.csv": (bytes(range(256)), "must be text"),
+    "half.csv.gz": (gzip.compress(b"1,2,3\n" * 100)[:-10], "gzip"),
+    "no.parquet": (b"PAR1", "no.parquet"),
+    "no.pkl": (b"\x80\x04 nothing", "must be a pickle"),
+    "system.pkl": (pickle.dumps(os.system), "asks for"),
+}
+
+
+def cut(path: Path, start: int, frames: int, walk: str = "anymal_walk", **changes: object) -> Path:
+    """A piece of a bundled walk, as a file."""
+    with np.load(WALKS / f"{walk}.npz") as file:
+        names = ("t", "q", "v", "a", "contacts")
+        arrays = {name: file[name][start : start + frames] for name in names}
+        arrays["contact_names"] = file["contact_names"]
+    arrays |= changes
+    np.savez(path, **{name: array for name, array in arrays.items() if array is not None})
+    return path
+
+
+def hover(path: Path, start: int, frames: int) -> Path:
+    """As cut, but no contact is ever active: not feasible."""
+    return cut(path, start, frames, contacts=np.zeros((frames, 4), dtype=bool))
+
+
+def write_clips(folder: Path) -> dict[str, str]:
+    """Clips and broken files, in subfolders too: file's name in results -> part of its error."""
+    (folder / "sub").mkdir(parents=True)
+    errors = {}
+    for number in range(5):
+        name = f"walk_{number}.npz"
+        cut(folder / name, 40 * number, 30 + 5 * number)
+        errors[name] = ""
+    cut(folder / "sub" / "trot.npz", 20, 50, "anymal_trot")
+    hover(folder / "sub" / "air.npz", 0, 40)
+    cut(folder / "frame.npz", 100, 1)
+    errors |= {"sub/trot.npz": "", "sub/air.npz": "", "frame.npz": ""}
+
+    for name, (content, part) in BROKEN.items():
+        (folder / name).write_bytes(content)
+        errors[name] = part
+    q = np.full((3, 19), np.nan)
+    cut(folder / "nan.npz", 0, 3, q=q)
+    cut(folder / "none.npz", 0, 0)
+    cut(folder / "wide.npz", 0, 3, q=np.zeros((3, 25)))
+    (folder / "gone.npz").symlink_to("nowhere.npz")
+    os.mkfifo(folder / "pipe.csv")
+    errors |= {
+        "nan.npz": "finite",
+        "none.npz": "none.npz",
+        "wide.npz": "19",
+        "gone.npz": "No such file",
+        "pipe.csv": "must be a file",
+    }
+    odd = '\\udcff<b>&".csv'
+    with open(os.fsencode(folder) + b'/\xff<b>&".csv', "w") as file:
+        file.write("x\n")
+    errors[odd] = "missing column"
+    # What is not looked for.
+    (folder / "README.md").write_text("Motions.")
+    (folder / ".hidden").mkdir()
+    cut(folder / ".hidden" / "walk.npz", 0, 10)
+    return {str(folder / name): part for name, part in errors.items()}
+
+
+def motion(robot: Robot, start: int, frames: int) -> dict[str, object]:
+    """What a pickle holds of a piece of the walk."""
+    with np.load(WALKS / "anymal_walk.npz") as file:
+        q = file["q"][start : start + frames]
+    return {
+        "fps": 50.0,
+        "root_pos": q[:, :3],
+        "root_rot": q[:, 3:7],
+        "dof_pos": q[:, 7:],
+        "dof_names": list(robot.model.names)[2:],
+    }
+
+
+class Program:
+    """Pickled, it runs a program where it is loaded by someone who trusts it."""
+
+    def __init__(self, expression: str) -> None:
+        self._expression = expression
+
+    def __reduce__(self) -> tuple:
+        return eval, (self._expression,)
+
+
+def write_program(path: Path, robot: Robot, start: int, statement: str) -> Path:
+    """A clip whose reader runs a statement first."""
+    data = pickle.dumps(motion(robot, start, 20))
+    expression = f"(exec({statement!r}), __import__('pickle').loads({data!r}))[1]"
+    path.write_bytes(pickle.dumps(Program(expression)))
+    return path
+
+
+def same(a: pyarrow.Table, b: pyarrow.Table) -> bool:
+    """Whether they are equal, but for what no two runs have in common."""
+    return a.drop(["seconds"]).equals(b.drop(["seconds"]))
