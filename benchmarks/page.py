@@ -71,6 +71,10 @@ GOAL_TABLE = {
     "computeDynamics": ("`computeDynamics`, Talos", 1.02),
     "computeDynamics(data)": ("`computeDynamics(data)`, Talos", 0.1),
     PYTHON_TICK: ("a tick from Python, Talos", 1.0),
+    "analyzeMotion/sway/avx512": ("a clip of 1024 frames that sways, G1, AVX-512", 0.15),
+    "analyzeMotion/sway/avx2": ("a clip of 1024 frames that sways, G1, AVX2", 0.22),
+    "analyzeMotion/dance/avx512": ("a dance of 1949 frames, G1, AVX-512", 0.5),
+    "analyzeMotion/2 threads": ("two threads, G1", round(1 / 1.9, 3)),
 }
 GOALS = {name: goal for name, (_, goal) in GOAL_TABLE.items() if goal}
 
@@ -125,6 +129,10 @@ def show_reference(name):
         return "2 × C++ + 3 µs"
     if name == "computeCentroidalMomentumTimeVariation":
         return "Pinocchio"
+    if name.startswith("Pinocchio and eiquadprog"):
+        return "Pinocchio + eiquadprog plain"
+    if name.endswith(" thread"):
+        return "one thread"
     if name.endswith(", median"):
         return "its median"
     solver, variant, *problem = name.split("/")

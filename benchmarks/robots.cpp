@@ -68,6 +68,30 @@ DynaCoM makeTalos() {
   return talos;
 }
 
+DynaCoM makeG1() {
+  DynaCoMSettings settings;
+  settings.urdf = DYNACOM_G1_URDF;
+  pinocchio::Model model = DynaCoM(settings).getModel();
+  const std::string sides[] = {"left", "right"};
+  const pinocchio::SE3 placement(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.035, 0., -0.035));
+  for (const std::string& side : sides) {
+    const pinocchio::Frame ankle = model.frames[model.getFrameId(side + "_ankle_roll_link")];
+    model.addFrame(pinocchio::Frame(side + "_sole", ankle.parentJoint, ankle.placement * placement,
+                                    pinocchio::OP_FRAME));
+  }
+  DynaCoM g1(model);
+  Contact6DSettings sole;
+  sole.mu = 0.7;
+  sole.gu = 0.06;
+  sole.half_length = 0.085;
+  sole.half_width = 0.025;
+  for (const std::string& side : sides) {
+    sole.frame_name = side + "_sole";
+    g1.addContact(std::make_shared<Contact6D>(sole), sole.frame_name);
+  }
+  return g1;
+}
+
 DynaCoM makeQuadruped() {
   return makeTrunk(
       {{0.42, 0.22, -0.5}, {0.30, -0.20, -0.5}, {-0.33, 0.20, -0.5}, {-0.38, -0.21, -0.5}},

@@ -16,6 +16,8 @@ constexpr double kFriction = 0.7, kYawFriction = 0.08, kHalfLength = 0.10, kHalf
 
 // Talos, with its two soles, "left" and "right".
 DynaCoM makeTalos();
+// Unitree's G1, with its two soles, as in python/dynacom/robots/g1.yaml.
+DynaCoM makeG1();
 // A trunk of 50 kg that stands on four points, in mid-stride.
 DynaCoM makeQuadruped();
 // The same trunk, on so many points or soles around it.

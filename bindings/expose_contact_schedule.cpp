@@ -31,8 +31,8 @@ std::string writeContactMotion(const ContactMotion& contact) {
                           ")");
 }
 
-bp::list listContactMotions(const DynaCoM& robot, const Motion& motion) {
-  return toList(computeContactMotions(robot, motion));
+bp::list listContactMotions(const DynaCoM& robot, const Motion& motion, int threads) {
+  return toList(computeContactMotions(robot, motion, threads));
 }
 
 Eigen::VectorXd estimate(const bp::object& contacts, const Eigen::VectorXd& time,
@@ -100,10 +100,10 @@ void exposeContactSchedule() {
                      "it is in the air there, unless it stands still as on a step of a stair [m].")
       .def(SettingsVisitor<Settings>());
 
-  bp::def(
-      "computeContactMotions", &listContactMotions, (bp::arg("robot"), bp::arg("motion")),
-      "A ContactMotion for each contact that a robot knows, in its order. Raises ValueError if\n"
-      "the motion is not valid.");
+  bp::def("computeContactMotions", &listContactMotions,
+          (bp::arg("robot"), bp::arg("motion"), bp::arg("threads") = 0),
+          "A ContactMotion for each contact that a robot knows, in its order; threads as in\n"
+          "analyzeMotion. Raises ValueError if the motion is not valid.");
   bp::def("estimateGround", &estimate,
           (bp::arg("contacts"), bp::arg("time"), bp::arg("settings") = DetectionSettings()),
           "The height of the ground under each of C contacts, (C,) [m]: the fifth percentile of\n"

@@ -35,8 +35,11 @@ bp::object getContactActive(const MotionAnalysis::Contact& contact) {
 }
 
 MotionAnalysis analyze(const DynaCoM& robot, const Motion& motion, const ContactSchedule& schedule,
-                       bool flat_horizontal_ground, double omega, const bp::object& progress) {
+                       bool flat_horizontal_ground, double omega, const bp::object& progress,
+                       int threads, int lanes) {
   AnalysisSettings settings;
+  settings.threads = threads;
+  settings.lanes = lanes;
   settings.flat_horizontal_ground = flat_horizontal_ground;
   settings.omega = omega;
   if (!progress.is_none())
@@ -64,15 +67,26 @@ void exposeMotionAnalysis() {
       "analyzeMotion", &analyze,
       (bp::arg("robot"), bp::arg("motion"), bp::arg("schedule"),
        bp::arg("flatHorizontalGround") = true, bp::arg("omega") = 0.,
-       bp::arg("progress") = bp::object()),
+       bp::arg("progress") = bp::object(), bp::arg("threads") = 0,
+       bp::arg("lanes") = AnalysisSettings::kMaximalLanes),
       "Computes dynamics and distribution for every frame of a motion, whose contacts are placed\n"
       "by the model: a pose that was measured once says nothing of them. The robot, a DynaCoM, is\n"
       "left as it is; contacts without schedule are never active.\n\n"
       "flatHorizontalGround: as in DynaCoM.computeDynamics; omega: of the virtual repellent\n"
       "point and the divergent component of motion [rad/s], 0 stands for sqrt(g / mean height of "
       "the centre of mass above the\n"
-      "ground); progress: called now and then with the number of frames done. Raises ValueError\n"
-      "if motion or schedule is not valid, or names a contact that the robot does not know.");
+      "ground); progress: called now and then with the number of frames done; threads: how many "
+      "do\n"
+      "the work, 0 for as many as the machine has, with the same results bit for bit; lanes: how\n"
+      "many frames a thread computes at once, at most, see countLanes. Raises ValueError if "
+      "motion\n"
+      "or schedule is not valid, or names a contact that the robot does not know.");
+  bp::def(
+      "countLanes", &countLanes,
+      (bp::arg("robot"), bp::arg("lanes") = AnalysisSettings::kMaximalLanes),
+      "How many lanes of SIMD registers this machine has for a robot, and no more than so many:\n"
+      "8 with AVX-512, 4 with AVX2, 1 where there is neither, or the robot has joints or\n"
+      "contacts that lanes do not know.");
 
   using Analysis = MotionAnalysis;
   using Contact = MotionAnalysis::Contact;

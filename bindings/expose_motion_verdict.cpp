@@ -39,9 +39,9 @@ std::shared_ptr<FaultLimit> makeLimit(double limit, double allowed_share) {
 MotionVerdict judge(const DynaCoM& robot, const Motion& motion, const Eigen::MatrixXd& recorded_q,
                     const Eigen::VectorXd& quaternion_error, const bp::object& contacts,
                     const Eigen::VectorXd& ground, const MotionAnalysis& analysis,
-                    const VerdictSettings& settings) {
+                    const VerdictSettings& settings, int threads) {
   return judgeMotion(robot, motion, {recorded_q.transpose(), quaternion_error},
-                     toVectorOf<ContactMotion>(contacts), ground, analysis, settings);
+                     toVectorOf<ContactMotion>(contacts), ground, analysis, settings, threads);
 }
 
 }  // namespace
@@ -106,11 +106,11 @@ void exposeMotionVerdict() {
       "judgeMotion", &judge,
       (bp::arg("robot"), bp::arg("motion"), bp::arg("recorded_q"), bp::arg("quaternion_error"),
        bp::arg("contacts"), bp::arg("ground"), bp::arg("analysis"),
-       bp::arg("settings") = VerdictSettings()),
+       bp::arg("settings") = VerdictSettings(), bp::arg("threads") = 0),
       "Judges a motion, for which computeContactMotions, estimateGround and analyzeMotion have\n"
       "been called. recorded_q: configurations before any filter, (T, nq); quaternion_error:\n"
-      "how far the norm of the root's was from 1 in the record, (T,). Raises ValueError if\n"
-      "settings or motion are not valid, or sizes differ.");
+      "how far the norm of the root's was from 1 in the record, (T,); threads as in\n"
+      "analyzeMotion. Raises ValueError if settings or motion are not valid, or sizes differ.");
 }
 
 }  // namespace dynacom::python

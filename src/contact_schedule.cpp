@@ -8,6 +8,7 @@
 #include <pinocchio/algorithm/kinematics.hpp>
 
 #include "check.hpp"
+#include "frame_blocks.hpp"
 
 namespace dynacom {
 
@@ -85,6 +86,77 @@ void cutToRest(const Eigen::VectorXd& speed, double rest_speed,
   });
 }
 
+// What a thread has to place the contacts of a robot: copies of these, and the joints that they
+// hang on.
+class ContactPlacer {
+ public:
+  explicit ContactPlacer(const DynaCoM& robot) : model_(robot.getModel()), data_(model_) {
+    std::vector<bool> carries(static_cast<std::size_t>(model_.njoints), false);
+    for (const std::string& name : robot.getKnownContacts()) {
+      const auto contact = robot.getContact(name)->clone();
+      const pinocchio::Frame& frame = model_.frames[contact->getFrameID()];
+      contacts_.push_back({contact, &frame, contact->getCorners()});
+      for (auto joint = frame.parentJoint; joint > 0; joint = model_.parents[joint])
+        carries[joint] = true;
+    }
+    for (std::size_t joint = 1; joint < carries.size(); ++joint)
+      if (carries[joint]) joints_.push_back(joint);
+  }
+
+  void place(const Motion& motion, Eigen::Index frame, std::vector<ContactMotion>& contacts) {
+    q_ = motion.q.col(frame);
+    v_ = motion.v.col(frame);
+    moveJoints();
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      const auto& [contact, contact_frame, corners] = contacts_[k];
+      const pinocchio::SE3& joint = data_.oMi[contact_frame->parentJoint];
+      contact->setPose(joint * contact_frame->placement);
+      const pinocchio::SE3 surface = contact->getSurfacePose();
+      Eigen::Vector3d lowest = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+      for (Eigen::Index corner = 0; corner < corners.cols(); ++corner) {
+        const Eigen::Vector3d point =
+            surface.act(Eigen::Vector3d(corners(0, corner), corners(1, corner), 0.));
+        if (point.z() < lowest.z()) lowest = point;
+      }
+      // In the joint's axes.
+      const pinocchio::Motion& velocity = data_.v[contact_frame->parentJoint];
+      contacts[k].position.col(frame) = surface.translation();
+      contacts[k].rotation.col(frame) = Eigen::Quaterniond(surface.rotation()).coeffs();
+      contacts[k].height[frame] = lowest.z();
+      contacts[k].velocity.col(frame) =
+          joint.rotation() * (velocity.linear() + velocity.angular().cross(joint.actInv(lowest)));
+    }
+  }
+
+ private:
+  struct Placed {
+    std::shared_ptr<ContactBase> contact;
+    const pinocchio::Frame* frame;
+    Eigen::Matrix2Xd corners;
+  };
+
+  // As pinocchio::forwardKinematics(), for the joints that carry contacts.
+  void moveJoints() {
+    for (const std::size_t k : joints_) {
+      const std::size_t parent = model_.parents[k];
+      pinocchio::JointData& joint = data_.joints[k];
+      model_.joints[k].calc(joint, q_, v_);
+      const pinocchio::SE3 moved = model_.jointPlacements[k] * joint.M();
+      data_.v[k] = joint.v();
+      data_.oMi[k] = moved;
+      if (parent == 0) continue;
+      data_.v[k] += moved.actInv(data_.v[parent]);
+      data_.oMi[k] = data_.oMi[parent] * moved;
+    }
+  }
+
+  const pinocchio::Model& model_;
+  pinocchio::Data data_;
+  std::vector<Placed> contacts_;
+  std::vector<std::size_t> joints_;
+  Eigen::VectorXd q_, v_;
+};
+
 }  // namespace
 
 void ContactSchedule::validate(Eigen::Index frames) const {
@@ -95,45 +167,25 @@ void ContactSchedule::validate(Eigen::Index frames) const {
   internal::requireSize("active", active.cols(), frames, "frames");
 }
 
-std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot, const Motion& motion) {
+std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot, const Motion& motion,
+                                                 int threads) {
+  requireField(threads >= 0, "threads", ">= 0", threads);
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by computeContactMotions before initialize()");
   const pinocchio::Model& model = robot.getModel();
   motion.validate(model);
   const Eigen::Index frames = motion.frames();
-  DynaCoM worker(robot);  // whose contacts are placed here
   std::vector<ContactMotion> contacts;
-  std::vector<std::pair<ContactBase*, const pinocchio::Frame*>> placed;
-  for (const std::string& name : worker.getKnownContacts()) {
+  for (const std::string& name : robot.getKnownContacts())
     contacts.push_back({name, Eigen::Matrix3Xd(3, frames), Eigen::Matrix4Xd(4, frames),
                         Eigen::VectorXd(frames), Eigen::Matrix3Xd(3, frames)});
-    ContactBase& contact = *worker.getContact(name);
-    placed.emplace_back(&contact, &model.frames[contact.getFrameID()]);
-  }
-  pinocchio::Data& data = worker.getData();
-  for (Eigen::Index frame = 0; frame < frames; ++frame) {
-    pinocchio::forwardKinematics(model, data, motion.q.col(frame), motion.v.col(frame));
-    for (std::size_t k = 0; k < placed.size(); ++k) {
-      const auto& [contact, contact_frame] = placed[k];
-      const pinocchio::SE3& joint = data.oMi[contact_frame->parentJoint];
-      contact->setPose(joint * contact_frame->placement);
-      const pinocchio::SE3 surface = contact->getSurfacePose();
-      Eigen::Vector3d lowest = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
-      const Eigen::Matrix2Xd corners = contact->getCorners();
-      for (Eigen::Index corner = 0; corner < corners.cols(); ++corner) {
-        const Eigen::Vector3d point =
-            surface.act(Eigen::Vector3d(corners(0, corner), corners(1, corner), 0.));
-        if (point.z() < lowest.z()) lowest = point;
-      }
-      const pinocchio::Motion& velocity =
-          data.v[contact_frame->parentJoint];  // in the joint's axes
-      contacts[k].position.col(frame) = surface.translation();
-      contacts[k].rotation.col(frame) = Eigen::Quaterniond(surface.rotation()).coeffs();
-      contacts[k].height[frame] = lowest.z();
-      contacts[k].velocity.col(frame) =
-          joint.rotation() * (velocity.linear() + velocity.angular().cross(joint.actInv(lowest)));
-    }
-  }
+  internal::forEachBlock(frames, threads, [&]() -> internal::BlockWork {
+    const auto placer = std::make_shared<ContactPlacer>(robot);
+    return [placer, &motion, &contacts](Eigen::Index first, Eigen::Index size) {
+      for (Eigen::Index frame = first; frame < first + size; ++frame)
+        placer->place(motion, frame, contacts);
+    };
+  });
   return contacts;
 }
 

@@ -181,14 +181,23 @@ void DualNewton::setContact(std::size_t slot, const Contact& contact) {
     if (i != BoxCone::kNormal && beta == 0.) block.free.bounds[static_cast<std::size_t>(i)] = 1;
   }
   block.reaches[BoxCone::kNormal] = 1.;
-  block.last = block.free;
   block.e.setZero();
   block.has_pure_moments = false;
+  forget(block);
+}
+
+void DualNewton::forget(Block& block) {
+  block.last = block.free;
   block.state = State();
   block.last_problem_number = problem_number_;
   block.is_free.setZero();
   block.edge.setZero();
   block.inverse_stiffness = 0.;
+}
+
+void DualNewton::forget() {
+  for (Block& block : blocks_) forget(block);
+  has_answer_ = finished_ = false;
 }
 
 void DualNewton::setActive(const std::vector<std::size_t>& slots,

@@ -101,6 +101,9 @@ class DualNewton {
   /// @param overall_weight  the wrench weights over those of solve()
   void writeAnswer(DistributionResult& result, double unit, double overall_weight) const;
 
+  /// Forgets the states of all answers: what comes next is as it would be if there had been none.
+  void forget();
+
   /// How many steps solve() took.
   int iterations() const { return iterations_; }
 
@@ -158,6 +161,7 @@ class DualNewton {
     Vector6 pull_of_distance, terms;
   };
 
+  void forget(Block& block);
   static void enter(Block& block, const State& state);
   template <int kSize>
   static State findState(const Block& block);

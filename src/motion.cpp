@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "check.hpp"
+#include "motion_check.hpp"
+#include "nan.hpp"
 
 namespace dynacom {
 
@@ -14,7 +16,7 @@ using internal::throwInvalid;
 
 namespace {
 
-// How far a quaternion's squared norm may be from 1: files are often rounded to a few digits.
+// How far a quaternion's norm may be from 1: files are often rounded to a few digits.
 constexpr double kNormalized = 1e-3;
 // What mismatches of derivatives are a part of at least: [m/s, rad/s], [m/s², rad/s²].
 constexpr double kLeastVelocity = 0.05, kLeastAcceleration = 0.5;
@@ -24,7 +26,7 @@ void requireFrames(const char* name, const Eigen::MatrixXd& values, Eigen::Index
   internal::requireSize(name, values.rows(), size, unit);
   internal::requireSize(name, values.cols(), frames, "frames");
   for (Eigen::Index frame = 0; frame < frames; ++frame)
-    if (!values.col(frame).allFinite())
+    if (!internal::areFinite(values.col(frame)))
       throwInvalid(name, " must be finite, got another number in frame ", frame);
 }
 
@@ -42,27 +44,66 @@ void requireTime(const Eigen::VectorXd& time) {
 void requireConfigurations(const pinocchio::Model& model, const Eigen::MatrixXd& q,
                            Eigen::Index frames) {
   requireFrames("q", q, model.nq, "components (nq)", frames);
+  const internal::MotionCheck check(model);
   for (Eigen::Index frame = 0; frame < frames; ++frame)
-    if (!pinocchio::isNormalized(model, q.col(frame), kNormalized))
+    if (!check.isConfiguration(q.col(frame)))
       throwInvalid("q must have quaternions of norm 1, got another in frame ", frame);
 }
 
-// A model with the configurations of another, in which the steps of a free-flyer are those of its
-// place in the world and of its orientation, independently: a body that flies straight on while it
-// turns does so for the filter, too.
-pinocchio::Model separateFreeFlyers(const pinocchio::Model& model) {
-  pinocchio::Model separated;
-  for (pinocchio::JointIndex joint = 1; joint < pinocchio::JointIndex(model.njoints); ++joint) {
+// Components of configurations that are numbers, each on its own: joints, and places in the world.
+struct Numbers {
+  std::vector<Eigen::Index> components;
+
+  Eigen::Index size() const { return Eigen::Index(components.size()); }
+  void difference(const Eigen::VectorXd& from, const Eigen::VectorXd& to,
+                  Eigen::VectorXd& step) const {
+    step = to - from;
+  }
+  void integrate(const Eigen::VectorXd& from, const Eigen::VectorXd& step,
+                 Eigen::VectorXd& to) const {
+    to = from + step;
+  }
+};
+
+// The others: a model of nothing but the joints that turn.
+struct Turns {
+  std::vector<Eigen::Index> components;
+  pinocchio::Model model;
+
+  Eigen::Index size() const { return model.nv; }
+  void difference(const Eigen::VectorXd& from, const Eigen::VectorXd& to,
+                  Eigen::VectorXd& step) const {
+    pinocchio::difference(model, from, to, step);
+  }
+  void integrate(const Eigen::VectorXd& from, const Eigen::VectorXd& step,
+                 Eigen::VectorXd& to) const {
+    pinocchio::integrate(model, from, step, to);
+    pinocchio::normalize(model, to);
+  }
+};
+
+// Takes the configurations of a model apart. The steps of a free-flyer are those of its place in
+// the world and of its orientation, independently: a body that flies straight on while it turns
+// does so for the filter, too.
+void separate(const pinocchio::Model& model, Numbers& numbers, Turns& turns) {
+  const auto take = [](std::vector<Eigen::Index>& components, int first, int size) {
+    for (int i = 0; i < size; ++i) components.push_back(first + i);
+  };
+  for (std::size_t k = 1; k < static_cast<std::size_t>(model.njoints); ++k) {
+    const pinocchio::JointModel& joint = model.joints[k];
+    const int first = joint.idx_q();
     const pinocchio::SE3 placement = pinocchio::SE3::Identity();
-    const std::string& name = model.names[joint];
-    if (model.joints[joint].shortname() == pinocchio::JointModelFreeFlyer::classname()) {
-      separated.addJoint(0, pinocchio::JointModelTranslation(), placement, name + " position");
-      separated.addJoint(0, pinocchio::JointModelSpherical(), placement, name + " orientation");
+    if (joint.nq() == joint.nv()) {
+      take(numbers.components, first, joint.nq());
+    } else if (joint.shortname() == pinocchio::JointModelFreeFlyer::classname()) {
+      take(numbers.components, first, 3);
+      take(turns.components, first + 3, 4);
+      turns.model.addJoint(0, pinocchio::JointModelSpherical(), placement, model.names[k]);
     } else {
-      separated.addJoint(0, model.joints[joint], placement, name);
+      take(turns.components, first, joint.nq());
+      turns.model.addJoint(0, joint, placement, model.names[k]);
     }
   }
-  return separated;
 }
 
 // A second-order section of a low-pass filter, with b₁ = 2 b₀ and b₂ = b₀,
@@ -84,23 +125,24 @@ struct Section {
   }
 
   // Filters columns in place, from the first to the last; before the first all was as it is there.
-  void filter(const pinocchio::Model& model, Eigen::MatrixXd& q) const {
-    Eigen::VectorXd x1 = q.col(0), x2 = x1, y1 = x1, y2 = x1, y(x1.size());
-    Eigen::VectorXd difference(model.nv), step(model.nv);
+  template <class Space>
+  void filter(const Space& space, Eigen::MatrixXd& q) const {
+    Eigen::VectorXd x = q.col(0), x1 = x, x2 = x, y1 = x, y2 = x, y(x.size());
+    Eigen::VectorXd difference(space.size()), step(space.size());
+    const auto add = [&](double factor, const Eigen::VectorXd& point) {
+      space.difference(y1, point, difference);
+      step += factor * difference;
+    };
     for (Eigen::Index frame = 0; frame < q.cols(); ++frame) {
+      x = q.col(frame);
       step.setZero();
-      const auto add = [&](double factor, const Eigen::VectorXd& point) {
-        pinocchio::difference(model, y1, point, difference);
-        step += factor * difference;
-      };
-      add(b, q.col(frame));
+      add(b, x);
       add(2. * b, x1);
       add(b, x2);
       add(-a2, y2);
-      pinocchio::integrate(model, y1, step, y);
-      pinocchio::normalize(model, y);
+      space.integrate(y1, step, y);
       x2.swap(x1);
-      x1 = q.col(frame);
+      x1.swap(x);
       y2.swap(y1);
       y1 = y;
       q.col(frame) = y;
@@ -108,7 +150,86 @@ struct Section {
   }
 };
 
+// Filters some components, which lie in a space of their own, forward and backward.
+template <class Space>
+void filterComponents(const Space& space, double rate, double cutoff, Eigen::MatrixXd& q) {
+  const Eigen::Index frames = q.cols(), rows = Eigen::Index(space.components.size());
+  if (rows == 0) return;
+  // Eight periods of the cut-off are enough for the filter to have forgotten how it began.
+  const auto periods = static_cast<Eigen::Index>(std::ceil(8. * rate / cutoff));
+  const Eigen::Index padding = std::min(frames - 1, periods);
+  Eigen::MatrixXd padded(rows, frames + 2 * padding);
+  for (Eigen::Index frame = 0; frame < frames; ++frame)
+    for (Eigen::Index row = 0; row < rows; ++row)
+      padded(row, padding + frame) = q(space.components[static_cast<std::size_t>(row)], frame);
+  // Step by step: what lies further away may have turned by more than a tangent space can tell.
+  Eigen::VectorXd step(space.size()), next(rows);
+  const auto reflect = [&](Eigen::Index from, Eigen::Index to, Eigen::Index at, int direction) {
+    space.difference(padded.col(from), padded.col(to), step);
+    step = -step;
+    space.integrate(padded.col(at), step, next);
+    padded.col(at + direction) = next;
+  };
+  const Eigen::Index first = padding, last = padding + frames - 1;
+  for (Eigen::Index k = 0; k < padding; ++k) {
+    reflect(first + k, first + k + 1, first - k, -1);
+    reflect(last - k, last - k - 1, last + k, 1);
+  }
+  for (int pass = 0; pass < 2; ++pass) {
+    for (const int number : {0, 1})
+      Section::butterworth(number, cutoff / rate).filter(space, padded);
+    padded.rowwise().reverseInPlace();
+  }
+  for (Eigen::Index frame = 0; frame < frames; ++frame)
+    for (Eigen::Index row = 0; row < rows; ++row)
+      q(space.components[static_cast<std::size_t>(row)], frame) = padded(row, padding + frame);
+}
+
 }  // namespace
+
+namespace internal {
+
+MotionCheck::MotionCheck(const pinocchio::Model& model) : model_(model) {
+  for (std::size_t k = 1; k < static_cast<std::size_t>(model.njoints); ++k) {
+    const pinocchio::JointModel& joint = model.joints[k];
+    if (joint.nq() == joint.nv()) continue;
+    const std::string name = joint.shortname();
+    if (name == pinocchio::JointModelFreeFlyer::classname())
+      circles_.push_back({joint.idx_q() + 3, 4});
+    else if (name == pinocchio::JointModelPlanar::classname())
+      circles_.push_back({joint.idx_q() + 2, 2});
+    else if (joint.nv() == 1 || name == pinocchio::JointModelSpherical::classname())
+      circles_.push_back({joint.idx_q(), joint.nq()});
+    else
+      is_known_ = false;
+  }
+}
+
+bool MotionCheck::hasSizes(const Motion& motion) const {
+  const Eigen::Index frames = motion.frames();
+  if (frames == 0 || motion.q.rows() != model_.nq || motion.q.cols() != frames) return false;
+  for (const Eigen::MatrixXd* values : {&motion.v, &motion.a})
+    if (values->rows() != model_.nv || values->cols() != frames) return false;
+  if (!areFinite(motion.time)) return false;
+  for (Eigen::Index frame = 1; frame < frames; ++frame)
+    if (!(motion.time[frame] > motion.time[frame - 1])) return false;
+  return true;
+}
+
+bool MotionCheck::isConfiguration(const Eigen::Ref<const Eigen::VectorXd>& q) const {
+  if (!areFinite(q)) return false;
+  if (!is_known_) return pinocchio::isNormalized(model_, q, kNormalized);
+  for (const Circle& circle : circles_)
+    if (!(std::abs(q.segment(circle.first, circle.size).norm() - 1.) <= kNormalized)) return false;
+  return true;
+}
+
+bool MotionCheck::isValid(const Motion& motion, Eigen::Index frame) const {
+  return isConfiguration(motion.q.col(frame)) && areFinite(motion.v.col(frame)) &&
+         areFinite(motion.a.col(frame));
+}
+
+}  // namespace internal
 
 void Motion::validate(const pinocchio::Model& model) const {
   requireTime(time);
@@ -128,31 +249,13 @@ Eigen::MatrixXd filterConfigurations(const pinocchio::Model& model, const Eigen:
   requireConfigurations(model, q, frames);
   if (frames < 2) return q;
 
-  // Eight periods of the cut-off are enough for the filter to have forgotten how it began.
-  const auto periods = static_cast<Eigen::Index>(std::ceil(8. * rate / cutoff));
-  const Eigen::Index padding = std::min(frames - 1, periods);
-  const pinocchio::Model separated = separateFreeFlyers(model);
-  Eigen::MatrixXd padded(model.nq, frames + 2 * padding);
-  padded.middleCols(padding, frames) = q;
-  // Step by step: what lies further away may have turned by more than a tangent space can tell.
-  Eigen::VectorXd step(model.nv), next(model.nq);
-  const auto reflect = [&](Eigen::Index from, Eigen::Index to, Eigen::Index at, int direction) {
-    pinocchio::difference(separated, padded.col(from), padded.col(to), step);
-    step = -step;
-    pinocchio::integrate(separated, padded.col(at), step, next);
-    padded.col(at + direction) = next;
-  };
-  const Eigen::Index first = padding, last = padding + frames - 1;
-  for (Eigen::Index k = 0; k < padding; ++k) {
-    reflect(first + k, first + k + 1, first - k, -1);
-    reflect(last - k, last - k - 1, last + k, 1);
-  }
-  for (int pass = 0; pass < 2; ++pass) {
-    for (const int number : {0, 1})
-      Section::butterworth(number, cutoff / rate).filter(separated, padded);
-    padded.rowwise().reverseInPlace();
-  }
-  return padded.middleCols(padding, frames);
+  Numbers numbers;
+  Turns turns;
+  separate(model, numbers, turns);
+  Eigen::MatrixXd filtered = q;
+  filterComponents(numbers, rate, cutoff, filtered);
+  filterComponents(turns, rate, cutoff, filtered);
+  return filtered;
 }
 
 Motion differentiate(const pinocchio::Model& model, const Eigen::VectorXd& time,
@@ -164,25 +267,34 @@ Motion differentiate(const pinocchio::Model& model, const Eigen::VectorXd& time,
                 Eigen::MatrixXd::Zero(model.nv, frames)};
   if (frames < 2) return motion;
 
-  Eigen::VectorXd first(model.nv), second(model.nv);
+  // From each frame to the next; back again it is the same with the other sign.
+  Eigen::MatrixXd steps(model.nv, frames - 1);
+  Eigen::VectorXd step(model.nv);
+  for (Eigen::Index frame = 0; frame + 1 < frames; ++frame) {
+    pinocchio::difference(model, q.col(frame), q.col(frame + 1), step);
+    steps.col(frame) = step;
+  }
+  if (frames == 2) {
+    motion.v.colwise() = steps.col(0) / (time[1] - time[0]);
+    return motion;
+  }
   // The parabola v s + ½ a s² through zero at s = 0 and two differences at others.
-  const auto fit = [&](Eigen::Index frame, Eigen::Index one, Eigen::Index other) {
-    pinocchio::difference(model, q.col(frame), q.col(one), first);
-    pinocchio::difference(model, q.col(frame), q.col(other), second);
-    const double s1 = time[one] - time[frame], s2 = time[other] - time[frame];
+  const auto fit = [&](Eigen::Index frame, double s1, const auto& first, double s2,
+                       const auto& second) {
     motion.a.col(frame) = 2. * (second / s2 - first / s1) / (s2 - s1);
     motion.v.col(frame) = first / s1 - 0.5 * s1 * motion.a.col(frame);
   };
-  if (frames == 2) {
-    for (const Eigen::Index frame : {0, 1}) {
-      pinocchio::difference(model, q.col(frame), q.col(1 - frame), first);
-      motion.v.col(frame) = first / (time[1 - frame] - time[frame]);
-    }
-    return motion;
-  }
-  fit(0, 1, 2);
-  for (Eigen::Index frame = 1; frame + 1 < frames; ++frame) fit(frame, frame - 1, frame + 1);
-  fit(frames - 1, frames - 2, frames - 3);
+  for (Eigen::Index frame = 1; frame + 1 < frames; ++frame)
+    fit(frame, time[frame - 1] - time[frame], -steps.col(frame - 1), time[frame + 1] - time[frame],
+        steps.col(frame));
+  const auto fitEnd = [&](Eigen::Index frame, Eigen::Index one, Eigen::Index other) {
+    Eigen::VectorXd first(model.nv), second(model.nv);
+    pinocchio::difference(model, q.col(frame), q.col(one), first);
+    pinocchio::difference(model, q.col(frame), q.col(other), second);
+    fit(frame, time[one] - time[frame], first, time[other] - time[frame], second);
+  };
+  fitEnd(0, 1, 2);
+  fitEnd(frames - 1, frames - 2, frames - 3);
   return motion;
 }
 

@@ -2,8 +2,12 @@
 #include "dynacom/motion_analysis.hpp"
 
 #include <cmath>
+#include <optional>
 
 #include "check.hpp"
+#include "frame_blocks.hpp"
+#include "lane_analysis.hpp"
+#include "motion_check.hpp"
 #include "nan.hpp"
 
 namespace dynacom {
@@ -12,8 +16,8 @@ using internal::kNaN;
 
 namespace {
 
-// How many frames pass between two calls of AnalysisSettings::progress.
-constexpr Eigen::Index kProgressFrames = 256;
+// A frame's numbers are not those of a motion; Motion::validate() says what is wrong.
+struct InvalidFrame {};
 
 // √(g / mean height of the CoM above the ground), the natural frequency of the pendulum.
 double computeOmega(const Eigen::Matrix3Xd& com, double gravity, double ground_height) {
@@ -22,17 +26,208 @@ double computeOmega(const Eigen::Matrix3Xd& com, double gravity, double ground_h
   return omega > 0. && std::isfinite(omega) ? omega : kNaN;
 }
 
-// What a contact does, for frames in which it takes no part.
-MotionAnalysis::Contact makeContact(const std::string& name, Eigen::Index frames) {
-  const Eigen::VectorXd unknown = Eigen::VectorXd::Constant(frames, kNaN);
-  return {name,
-          Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, false),
-          Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, frames),
-          Eigen::VectorXd::Zero(frames),
-          Eigen::Matrix2Xd::Constant(2, frames, kNaN),
-          unknown,
-          unknown,
-          unknown};
+// Storage for all frames, in which nothing is written yet but what contacts are called, and when
+// they are active.
+MotionAnalysis makeStorage(const std::vector<std::string>& names, const Motion& motion,
+                           const ContactSchedule& schedule) {
+  const Eigen::Index frames = motion.frames();
+  MotionAnalysis result;
+  result.omega = kNaN;
+  result.time = motion.time;
+  for (Eigen::Matrix3Xd* values :
+       {&result.com, &result.vcom, &result.acom, &result.am, &result.dam, &result.ground_force,
+        &result.ground_torque, &result.feasible_acom, &result.feasible_dam})
+    values->resize(3, frames);
+  for (Eigen::Matrix2Xd* values : {&result.cop, &result.vrp, &result.nl, &result.dcm})
+    values->resize(2, frames);
+  result.status.resize(static_cast<std::size_t>(frames));
+  result.residual.resize(6, frames);
+  for (const std::string& name : names) {
+    MotionAnalysis::Contact contact;
+    contact.name = name;
+    contact.active.setConstant(frames, false);
+    for (std::size_t k = 0; k < schedule.names.size(); ++k)
+      if (schedule.names[k] == name)
+        contact.active = schedule.active.row(static_cast<Eigen::Index>(k)).transpose();
+    contact.wrench.resize(6, frames);
+    contact.cop.resize(2, frames);
+    for (Eigen::VectorXd* values : {&contact.vertical_force, &contact.friction_usage,
+                                    &contact.yaw_usage, &contact.cop_margin})
+      values->resize(frames);
+    result.contacts.push_back(std::move(contact));
+  }
+  return result;
+}
+
+// What a thread does with blocks of frames.
+class Analyst {
+ public:
+  Analyst(const DynaCoM& robot, const internal::LaneRobot* lane_robot, const Motion& motion,
+          const ContactSchedule& schedule, const AnalysisSettings& settings, MotionAnalysis& result)
+      : robot_(robot),
+        motion_(motion),
+        schedule_(schedule),
+        flat_(settings.flat_horizontal_ground),
+        check_(robot.getModel()),
+        result_(result) {
+    if (lane_robot) lanes_.emplace(*lane_robot);
+  }
+
+  void analyze(Eigen::Index first, Eigen::Index frames) {
+    writeDefaults(first, frames);
+    is_cold_ = true;
+    if (lanes_) lanes_->run(motion_, first, frames, result_);
+    for (Eigen::Index k = 0; k < frames; ++k) {
+      const Eigen::Index frame = first + k;
+      const auto outcome = lanes_ ? lanes_->outcome(k) : lanes::Outcome::Nothing;
+      switch (outcome) {
+        case lanes::Outcome::Everything:
+          result_.status[static_cast<std::size_t>(frame)] = DistributionStatus::Solved;
+          break;
+        case lanes::Outcome::Dynamics:
+          takeDynamics(k, frame);
+          break;
+        case lanes::Outcome::Nothing:
+          computeDynamics(frame);
+          break;
+      }
+    }
+  }
+
+ private:
+  void writeDefaults(Eigen::Index first, Eigen::Index frames);
+  DynaCoM& prepare(Eigen::Index frame);
+  void takeDynamics(Eigen::Index k, Eigen::Index frame);
+  void computeDynamics(Eigen::Index frame);
+  void finish(Eigen::Index frame);
+
+  const DynaCoM& robot_;
+  const Motion& motion_;
+  const ContactSchedule& schedule_;
+  const bool flat_;
+  const internal::MotionCheck check_;
+  MotionAnalysis& result_;
+  std::optional<internal::LaneAnalysis> lanes_;
+  // For what the lanes leave, as soon as there is any: a robot, and its contacts.
+  std::optional<DynaCoM> worker_;
+  std::vector<std::shared_ptr<const ContactBase>> contacts_;
+  bool is_cold_ = true;  // whether the worker has done nothing in this block
+};
+
+// What holds where nothing is active, and a pressure and its points have no meaning.
+void Analyst::writeDefaults(Eigen::Index first, Eigen::Index frames) {
+  for (Eigen::Matrix2Xd* values : {&result_.cop, &result_.vrp, &result_.nl, &result_.dcm})
+    values->middleCols(first, frames).setConstant(kNaN);
+  for (MotionAnalysis::Contact& contact : result_.contacts) {
+    contact.wrench.middleCols(first, frames).setZero();
+    contact.vertical_force.segment(first, frames).setZero();
+    contact.cop.middleCols(first, frames).setConstant(kNaN);
+    for (Eigen::VectorXd* values :
+         {&contact.friction_usage, &contact.yaw_usage, &contact.cop_margin})
+      values->segment(first, frames).setConstant(kNaN);
+  }
+}
+
+// The robot with the contacts of a frame.
+DynaCoM& Analyst::prepare(Eigen::Index frame) {
+  if (!worker_) {
+    worker_.emplace(robot_);
+    for (const MotionAnalysis::Contact& contact : result_.contacts) {
+      worker_->resetContactPose(contact.name);
+      worker_->deactivateContact(contact.name);
+      contacts_.push_back(worker_->getContact(contact.name));
+    }
+  }
+  if (is_cold_) {
+    for (const std::string& name : schedule_.names) worker_->deactivateContact(name);
+    worker_->forgetDistributions();
+    is_cold_ = false;
+  }
+  for (std::size_t k = 0; k < schedule_.names.size(); ++k) {
+    if (schedule_.active(static_cast<Eigen::Index>(k), frame))
+      worker_->activateContact(schedule_.names[k]);
+    else
+      worker_->deactivateContact(schedule_.names[k]);
+  }
+  return *worker_;
+}
+
+// From the dynamics that lanes have computed.
+void Analyst::takeDynamics(Eigen::Index k, Eigen::Index frame) {
+  DynaCoM& worker = prepare(frame);
+  const pinocchio::Model& model = worker.getModel();
+  pinocchio::Data& data = worker.getData();
+  data.mass[0] = worker.getMass();
+  data.com[0] = result_.com.col(frame);
+  data.vcom[0] = result_.vcom.col(frame);
+  data.hg.linear() = data.mass[0] * data.vcom[0];
+  data.hg.angular() = result_.am.col(frame);
+  data.dhg.linear() = data.mass[0] * result_.acom.col(frame);
+  data.dhg.angular() = result_.dam.col(frame);
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    if (!result_.contacts[i].active[frame]) continue;
+    const pinocchio::Frame& contact_frame = model.frames[contacts_[i]->getFrameID()];
+    data.oMi[contact_frame.parentJoint] =
+        lanes_->placement(i, k) * contact_frame.placement.inverse();
+  }
+  worker.computeDynamics(data, DynaCoM::Vector6::Zero(), flat_);
+  finish(frame);
+}
+
+void Analyst::computeDynamics(Eigen::Index frame) {
+  if (!check_.isValid(motion_, frame)) throw InvalidFrame();
+  prepare(frame).computeDynamics(motion_.q.col(frame), motion_.v.col(frame), motion_.a.col(frame),
+                                 DynaCoM::Vector6::Zero(), flat_);
+  finish(frame);
+}
+
+// Distributes the wrench, and writes all that the worker knows.
+void Analyst::finish(Eigen::Index frame) {
+  DynaCoM& worker = *worker_;
+  result_.com.col(frame) = worker.getCoM();
+  result_.vcom.col(frame) = worker.getVCoM();
+  result_.acom.col(frame) = worker.getACoM();
+  result_.am.col(frame) = worker.getAM();
+  result_.dam.col(frame) = worker.getAMVariation();
+  result_.ground_force.col(frame) = worker.getGroundCoMForce();
+  result_.ground_torque.col(frame) = worker.getGroundCoMTorque();
+  result_.cop.col(frame) = worker.getCoP();
+
+  // On uneven ground the centre of pressure needed the distribution already.
+  if (flat_)
+    worker.distributeForce(worker.getGroundCoMForce(), worker.getGroundCoMTorque(),
+                           worker.getCoM());
+  result_.status[static_cast<std::size_t>(frame)] = worker.getDistributionStatus();
+  result_.residual.col(frame) = worker.getDistribution().residual;
+  result_.feasible_acom.col(frame) = worker.getFeasibleACoM();
+  result_.feasible_dam.col(frame) = worker.getFeasibleAMVariation();
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    MotionAnalysis::Contact& contact = result_.contacts[k];
+    if (!contact.active[frame]) continue;
+    contact.wrench.col(frame).head(contacts_[k]->cols()) = contacts_[k]->appliedForce();
+    contact.vertical_force[frame] = contacts_[k]->toCoMForces().z();
+    contact.cop.col(frame) = worker.getContactCoP(contact.name);
+    contact.friction_usage[frame] = worker.getContactFrictionUsage(contact.name);
+    contact.yaw_usage[frame] = worker.getContactYawUsage(contact.name);
+    contact.cop_margin[frame] = worker.getContactCoPMargin(contact.name);
+  }
+}
+
+// Virtual repellent point (7), non-linearity (8) and divergent component of motion (20) of the
+// motion whose centre of pressure is reported, as DynaCoM::computeNL().
+void addPoints(MotionAnalysis& result, bool flat_horizontal_ground, Eigen::Index first,
+               Eigen::Index frames) {
+  const Eigen::Matrix3Xd& acceleration =
+      flat_horizontal_ground ? result.acom : result.feasible_acom;
+  CentroidalState state;
+  for (Eigen::Index frame = first; frame < first + frames; ++frame) {
+    state.com = result.com.col(frame);
+    state.vcom = result.vcom.col(frame);
+    state.acom = acceleration.col(frame);
+    result.vrp.col(frame) = computeVRP(state, result.omega);
+    result.dcm.col(frame) = computeDCM(state, result.omega);
+    result.nl.col(frame) = result.cop.col(frame) - result.vrp.col(frame);
+  }
 }
 
 }  // namespace
@@ -40,98 +235,53 @@ MotionAnalysis::Contact makeContact(const std::string& name, Eigen::Index frames
 void AnalysisSettings::validate() const {
   internal::requireField(omega >= 0. && std::isfinite(omega), "AnalysisSettings.omega",
                          "finite and >= 0 rad/s", omega);
+  internal::requireField(threads >= 0, "AnalysisSettings.threads", ">= 0", threads);
+  internal::requireField(lanes >= 1, "AnalysisSettings.lanes", ">= 1", lanes);
+}
+
+int countLanes(const DynaCoM& robot, int lanes) {
+  if (!robot.isInitialized())
+    throw NotReadyError("DynaCoM is used by countLanes before initialize()");
+  const auto lane_robot = internal::LaneRobot::make(robot, true, lanes);
+  return lane_robot ? lane_robot->lanes() : 1;
 }
 
 MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
                              const ContactSchedule& schedule, const AnalysisSettings& settings) {
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by analyzeMotion before initialize()");
-  const Eigen::Index frames = motion.frames();
-  motion.validate(robot.getModel());
-  schedule.validate(frames);
+  const internal::MotionCheck check(robot.getModel());
+  if (!check.hasSizes(motion)) motion.validate(robot.getModel());
+  schedule.validate(motion.frames());
   settings.validate();
 
-  DynaCoM worker(robot);
-  for (const std::string& name : worker.getKnownContacts()) worker.resetContactPose(name);
-  MotionAnalysis result;
-  for (const std::string& name : schedule.names) worker.getContact(name);
-  std::vector<std::shared_ptr<const ContactBase>> contacts;
-  for (const std::string& name : worker.getKnownContacts()) {
-    worker.deactivateContact(name);
-    contacts.push_back(worker.getContact(name));
-    result.contacts.push_back(makeContact(name, frames));
-  }
-  for (std::size_t k = 0; k < schedule.names.size(); ++k)
-    for (MotionAnalysis::Contact& contact : result.contacts)
-      if (contact.name == schedule.names[k]) contact.active = schedule.active.row(k).transpose();
-  result.time = motion.time;
-  for (Eigen::Matrix3Xd* values :
-       {&result.com, &result.vcom, &result.acom, &result.am, &result.dam, &result.ground_force,
-        &result.ground_torque, &result.feasible_acom, &result.feasible_dam})
-    values->resize(3, frames);
-  for (Eigen::Matrix2Xd* values : {&result.cop, &result.vrp, &result.nl, &result.dcm})
-    values->setConstant(2, frames, kNaN);
-  result.status.resize(frames);
-  result.residual.resize(6, frames);
-
-  for (Eigen::Index frame = 0; frame < frames; ++frame) {
-    for (std::size_t k = 0; k < schedule.names.size(); ++k) {
-      if (schedule.active(k, frame))
-        worker.activateContact(schedule.names[k]);
-      else
-        worker.deactivateContact(schedule.names[k]);
-    }
-    worker.computeDynamics(motion.q.col(frame), motion.v.col(frame), motion.a.col(frame),
-                           DynaCoM::Vector6::Zero(), settings.flat_horizontal_ground);
-    result.com.col(frame) = worker.getCoM();
-    result.vcom.col(frame) = worker.getVCoM();
-    result.acom.col(frame) = worker.getACoM();
-    result.am.col(frame) = worker.getAM();
-    result.dam.col(frame) = worker.getAMVariation();
-    result.ground_force.col(frame) = worker.getGroundCoMForce();
-    result.ground_torque.col(frame) = worker.getGroundCoMTorque();
-    result.cop.col(frame) = worker.getCoP();
-
-    // On uneven ground the centre of pressure needed the distribution already.
-    if (settings.flat_horizontal_ground)
-      worker.distributeForce(worker.getGroundCoMForce(), worker.getGroundCoMTorque(),
-                             worker.getCoM());
-    result.status[frame] = worker.getDistributionStatus();
-    result.residual.col(frame) = worker.getDistribution().residual;
-    result.feasible_acom.col(frame) = worker.getFeasibleACoM();
-    result.feasible_dam.col(frame) = worker.getFeasibleAMVariation();
-    for (std::size_t k = 0; k < contacts.size(); ++k) {
-      MotionAnalysis::Contact& contact = result.contacts[k];
-      if (!contact.active[frame]) continue;
-      contact.wrench.col(frame).head(contacts[k]->cols()) = contacts[k]->appliedForce();
-      contact.vertical_force[frame] = contacts[k]->toCoMForces().z();
-      contact.cop.col(frame) = worker.getContactCoP(contact.name);
-      contact.friction_usage[frame] = worker.getContactFrictionUsage(contact.name);
-      contact.yaw_usage[frame] = worker.getContactYawUsage(contact.name);
-      contact.cop_margin[frame] = worker.getContactCoPMargin(contact.name);
-    }
-    if (settings.progress && (frame + 1) % kProgressFrames == 0) settings.progress(frame + 1);
+  for (const std::string& name : schedule.names) robot.getContact(name);
+  const std::vector<std::string> names = robot.getKnownContacts();
+  MotionAnalysis result = makeStorage(names, motion, schedule);
+  const auto lane_robot =
+      internal::LaneRobot::make(robot, settings.flat_horizontal_ground, settings.lanes);
+  const auto makeWork = [&]() -> internal::BlockWork {
+    const auto analyst = std::make_shared<Analyst>(robot, lane_robot ? &*lane_robot : nullptr,
+                                                   motion, schedule, settings, result);
+    return [analyst](Eigen::Index first, Eigen::Index frames) { analyst->analyze(first, frames); };
+  };
+  try {
+    internal::forEachBlock(motion.frames(), settings.threads, makeWork, settings.progress);
+  } catch (const InvalidFrame&) {
+    motion.validate(robot.getModel());
+    throw;
   }
 
   result.omega = settings.omega;
   if (result.omega == 0.)
     result.omega =
-        computeOmega(result.com, -worker.getSettings().gravity.z(), worker.getGroundHeight());
-  if (!std::isnan(result.omega)) {
-    // Of the motion whose centre of pressure is reported, as DynaCoM::computeNL().
-    const Eigen::Matrix3Xd& acceleration =
-        settings.flat_horizontal_ground ? result.acom : result.feasible_acom;
-    CentroidalState state;
-    for (Eigen::Index frame = 0; frame < frames; ++frame) {
-      state.com = result.com.col(frame);
-      state.vcom = result.vcom.col(frame);
-      state.acom = acceleration.col(frame);
-      result.vrp.col(frame) = computeVRP(state, result.omega);
-      result.dcm.col(frame) = computeDCM(state, result.omega);
-    }
-    result.nl = result.cop - result.vrp;  // (8)
-  }
-  if (settings.progress && frames % kProgressFrames != 0) settings.progress(frames);
+        computeOmega(result.com, -robot.getSettings().gravity.z(), robot.getGroundHeight());
+  if (std::isnan(result.omega)) return result;
+  internal::forEachBlock(motion.frames(), settings.threads, [&]() -> internal::BlockWork {
+    return [&](Eigen::Index first, Eigen::Index frames) {
+      addPoints(result, settings.flat_horizontal_ground, first, frames);
+    };
+  });
   return result;
 }
 

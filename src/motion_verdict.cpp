@@ -6,8 +6,10 @@
 #include <limits>
 #include <ostream>
 #include <pinocchio/algorithm/joint-configuration.hpp>
+#include <pinocchio/algorithm/kinematics.hpp>
 
 #include "check.hpp"
+#include "frame_blocks.hpp"
 
 namespace dynacom {
 
@@ -82,18 +84,24 @@ class SecondLook {
     for (const std::string& name : names_) robot_.resetContactPose(name);
   }
 
+  // Begins a block of frames, which does not depend on others.
+  void begin() {
+    for (const std::string& name : names_) robot_.deactivateContact(name);
+    robot_.forgetDistributions();
+  }
+
   // What is missing with these contacts.
-  Vector6 findResidual(const Motion& motion, Eigen::Index frame,
+  Vector6 findResidual(const Motion& motion, const MotionAnalysis& analysis, Eigen::Index frame,
                        const Eigen::Array<bool, Eigen::Dynamic, 1>& active) {
+    pinocchio::forwardKinematics(robot_.getModel(), robot_.getData(), motion.q.col(frame));
     for (std::size_t k = 0; k < names_.size(); ++k) {
       if (active[static_cast<Eigen::Index>(k)])
         robot_.activateContact(names_[k]);
       else
         robot_.deactivateContact(names_[k]);
     }
-    robot_.computeDynamics(motion.q.col(frame), motion.v.col(frame), motion.a.col(frame));
-    robot_.distributeForce(robot_.getGroundCoMForce(), robot_.getGroundCoMTorque(),
-                           robot_.getCoM());
+    robot_.distributeForce(analysis.ground_force.col(frame), analysis.ground_torque.col(frame),
+                           analysis.com.col(frame));
     return robot_.getDistribution().residual;
   }
 
@@ -187,7 +195,9 @@ bool MotionVerdict::isFeasible() const {
 MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
                           const RecordedMotion& recorded,
                           const std::vector<ContactMotion>& contacts, const Eigen::VectorXd& ground,
-                          const MotionAnalysis& analysis, const VerdictSettings& settings) {
+                          const MotionAnalysis& analysis, const VerdictSettings& settings,
+                          int threads) {
+  requireField(threads >= 0, "threads", ">= 0", threads);
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by judgeMotion before initialize()");
   settings.validate();
@@ -218,9 +228,8 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
   const auto measure = [&](MotionFault fault) -> Eigen::VectorXd& {
     return measured[static_cast<std::size_t>(fault)];
   };
-  SecondLook second_look(robot);
-  Eigen::Array<bool, Eigen::Dynamic, 1> active(count), near(count);
-  for (Eigen::Index frame = 0; frame < frames; ++frame) {
+  const auto judgeFrame = [&](Eigen::Index frame, const auto& lookAgain) {
+    Eigen::Array<bool, Eigen::Dynamic, 1> active(count), near(count);
     for (Eigen::Index k = 0; k < count; ++k) {
       const ContactMotion& contact = contacts[static_cast<std::size_t>(k)];
       const double height = contact.height[frame] - ground[k];
@@ -239,8 +248,7 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
     const bool out_of_reach = flight ? unsupported : !residual.isWithin(settings);
     const bool contact_missing =
         out_of_reach && residual.larger() > settings.contact_missing.limit &&
-        (near != active).any() &&
-        WrenchSize(second_look.findResidual(motion, frame, near), weight).isWithin(settings);
+        (near != active).any() && WrenchSize(lookAgain(frame, near), weight).isWithin(settings);
     if (contact_missing) {
       measure(MotionFault::ContactMissing)[frame] = residual.larger();
     } else if (flight) {
@@ -249,7 +257,21 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
       measure(MotionFault::ResidualForce)[frame] = residual.force;
       measure(MotionFault::ResidualTorque)[frame] = residual.torque;
     }
-  }
+  };
+  internal::forEachBlock(frames, threads, [&]() -> internal::BlockWork {
+    return [&, second_look = std::shared_ptr<SecondLook>()](Eigen::Index first,
+                                                            Eigen::Index size) mutable {
+      if (second_look) second_look->begin();
+      const auto lookAgain = [&](Eigen::Index frame, const auto& active) {
+        if (!second_look) {
+          second_look = std::make_shared<SecondLook>(robot);
+          second_look->begin();
+        }
+        return second_look->findResidual(motion, analysis, frame, active);
+      };
+      for (Eigen::Index frame = first; frame < first + size; ++frame) judgeFrame(frame, lookAgain);
+    };
+  });
   measure(MotionFault::Discontinuity) = measureJumps(robot.getModel(), recorded.q);
   measure(MotionFault::Quaternion) = recorded.quaternion_error;
 

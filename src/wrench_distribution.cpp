@@ -300,6 +300,11 @@ void WrenchDistribution::reset() {
   work_ = std::move(fresh);
 }
 
+void WrenchDistribution::forgetAnswers() {
+  work_->newton.forget();
+  work_->has_answer = false;
+}
+
 void WrenchDistribution::forgetForces() { work_->has_answer = false; }
 
 const DistributionResult& WrenchDistribution::result() const { return work_->result; }

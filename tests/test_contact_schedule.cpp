@@ -110,6 +110,8 @@ BOOST_AUTO_TEST_CASE(contacts_are_where_pinocchio_says_and_move_as_their_places_
   }
   BOOST_TEST(
       throws<NotReadyError>([&] { computeContactMotions(DynaCoM(), motion); }, {"initialize"}));
+  BOOST_TEST(throws<std::invalid_argument>([&] { computeContactMotions(robot, motion, -1); },
+                                           {"threads", "-1"}));
   motion.v(0, 3) = kNaN;
   BOOST_TEST(
       throws<std::invalid_argument>([&] { computeContactMotions(robot, motion); }, {"v", "3"}));

@@ -2,10 +2,12 @@
 #define BOOST_TEST_MODULE motion_analysis
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <limits>
 #include <map>
-#include <mutex>
+#include <set>
+#include <thread>
 
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
@@ -67,6 +69,55 @@ boost::test_tools::predicate_result sameOrNaN(const VectorXd& actual, const Vect
                                               double tolerance = 1e-12) {
   if (allNaN(expected)) return allNaN(actual);
   return close(actual, expected, tolerance);
+}
+
+/// All numbers of an analysis, by what they are.
+std::map<std::string, MatrixXd> numbersOf(const MotionAnalysis& analysis) {
+  std::map<std::string, MatrixXd> numbers = {{"com", analysis.com},
+                                             {"vcom", analysis.vcom},
+                                             {"acom", analysis.acom},
+                                             {"am", analysis.am},
+                                             {"dam", analysis.dam},
+                                             {"ground_force", analysis.ground_force},
+                                             {"ground_torque", analysis.ground_torque},
+                                             {"feasible_acom", analysis.feasible_acom},
+                                             {"feasible_dam", analysis.feasible_dam},
+                                             {"cop", analysis.cop},
+                                             {"vrp", analysis.vrp},
+                                             {"nl", analysis.nl},
+                                             {"dcm", analysis.dcm},
+                                             {"residual", analysis.residual}};
+  for (const MotionAnalysis::Contact& contact : analysis.contacts) {
+    numbers[contact.name + " wrench"] = contact.wrench;
+    numbers[contact.name + " vertical_force"] = contact.vertical_force.transpose();
+    numbers[contact.name + " cop"] = contact.cop;
+    numbers[contact.name + " friction_usage"] = contact.friction_usage.transpose();
+    numbers[contact.name + " yaw_usage"] = contact.yaw_usage.transpose();
+    numbers[contact.name + " cop_margin"] = contact.cop_margin.transpose();
+  }
+  return numbers;
+}
+
+/// Bit for bit, so that a NaN is the same as itself, and 0 is not −0.
+bool sameBits(const MatrixXd& one, const MatrixXd& other) {
+  return one.size() == other.size() &&
+         std::memcmp(one.data(), other.data(), sizeof(double) * std::size_t(one.size())) == 0;
+}
+
+void checkSameBits(const MotionAnalysis& one, const MotionAnalysis& other) {
+  const auto numbers = numbersOf(one), others = numbersOf(other);
+  for (const auto& [name, values] : numbers)
+    BOOST_TEST_CONTEXT(name) BOOST_TEST(sameBits(values, others.at(name)));
+  BOOST_TEST((one.status == other.status));
+  BOOST_TEST(one.omega == other.omega);
+}
+
+/// A walk of several blocks, of which many frames are within what the contacts give, and some not.
+Walk longWalk(unsigned seed, Index frames = 1100) {
+  Walk walk(seed, frames);
+  walk.robot.setGroundHeight(-0.1);
+  for (Index frame = 0; frame < frames; frame += 11) walk.motion.a(0, frame) += 30.;
+  return walk;
 }
 
 }  // namespace
@@ -250,19 +301,173 @@ BOOST_AUTO_TEST_CASE(where_there_is_no_pendulum_there_is_no_omega) {
   BOOST_TEST(result.vrp.allFinite());
 }
 
-BOOST_AUTO_TEST_CASE(progress_is_told) {
-  Walk walk(7, 700);
-  AnalysisSettings settings;
-  std::mutex mutex;
-  std::vector<Index> told;
-  settings.progress = [&](Index frames) {
-    const std::lock_guard<std::mutex> lock(mutex);
-    told.push_back(frames);
+BOOST_AUTO_TEST_CASE(progress_is_told_in_the_callers_thread_and_increases) {
+  Walk walk(7, 1300);
+  for (const int threads : {1, 2, 3, 8}) {
+    AnalysisSettings settings;
+    settings.threads = threads;
+    std::vector<Index> told;
+    settings.progress = [&, caller = std::this_thread::get_id()](Index frames) {
+      BOOST_TEST((std::this_thread::get_id() == caller));
+      told.push_back(frames);
+    };
+    analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
+    BOOST_REQUIRE(!told.empty());
+    BOOST_TEST(told.front() > 0);
+    for (std::size_t k = 1; k < told.size(); ++k) BOOST_TEST(told[k] > told[k - 1]);
+    BOOST_TEST(told.back() == 1300);
+    if (threads == 1) BOOST_TEST(told.size() == 6u);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(what_is_thrown_in_a_thread_comes_to_the_caller) {
+  Walk walk(12, 1300);
+  for (const int threads : {1, 2, 8}) {
+    AnalysisSettings settings;
+    settings.threads = threads;
+    Motion bad = walk.motion;
+    bad.v(3, 1299) = bad.a(2, 700) = kNaN;
+    BOOST_TEST(throws<std::invalid_argument>(
+        [&] { analyzeMotion(walk.robot, bad, walk.schedule, settings); }, {"v", "1299"}));
+    int calls = 0;
+    settings.progress = [&](Index) {
+      ++calls;
+      throw std::runtime_error("enough of it");
+    };
+    BOOST_TEST(throws<std::runtime_error>(
+        [&] { analyzeMotion(walk.robot, walk.motion, walk.schedule, settings); },
+        {"enough of it"}));
+    BOOST_TEST(calls == 1);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(results_are_the_same_whatever_the_number_of_threads) {
+  const Walk walk = longWalk(13);
+  for (const bool flat : {true, false})
+    for (const int lanes : {1, 4, 8})
+      BOOST_TEST_CONTEXT("flat " << flat << ", " << lanes << " lanes") {
+        AnalysisSettings settings;
+        settings.flat_horizontal_ground = flat;
+        settings.lanes = lanes;
+        settings.threads = 1;
+        const auto expected = analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
+        for (const int threads : {2, 3, 8, 0}) {
+          settings.threads = threads;
+          checkSameBits(analyzeMotion(walk.robot, walk.motion, walk.schedule, settings), expected);
+        }
+      }
+}
+
+BOOST_AUTO_TEST_CASE(lanes_say_what_one_frame_at_a_time_says) {
+  std::set<int> met;
+  std::map<DistributionStatus, int> count;
+  for (unsigned seed = 20; seed < 30; ++seed) {
+    Walk walk = longWalk(seed, 301);
+    if (seed % 2 == 0)
+      walk.robot.setWrenchWeights((Vector6() << 1., 1., 1., 3., 3., 4.).finished());
+    // Contacts without some extents, with other weights, and aligned with the world.
+    Contact6DSettings edge;
+    edge.frame_name = "sole0";
+    edge.mu = 0.6;
+    edge.half_width = 0.3;
+    edge.weights << 1., 2., 1., 3., 4., 5.;
+    ContactPointSettings ball;
+    ball.frame_name = "sole1";
+    ball.mu = 0.8;
+    ball.radius = 0.05;
+    ball.world_aligned = true;
+    walk.robot.addContact(std::make_shared<Contact6D>(edge), "edge");
+    walk.robot.addContact(std::make_shared<ContactPoint>(ball), "ball");
+    ContactSchedule& schedule = walk.schedule;
+    schedule.names.insert(schedule.names.end(), {"edge", "ball"});
+    schedule.active.conservativeResize(5, Eigen::NoChange);
+    for (Index frame = 0; frame < 301; ++frame)
+      schedule.active.col(frame).tail<2>() << walk.random.coin(), walk.random.coin();
+    // Far away from the world's origin.
+    walk.motion.q.row(0).array() += 20.;
+
+    for (const bool flat : {true, false}) {
+      AnalysisSettings settings;
+      settings.flat_horizontal_ground = flat;
+      settings.lanes = 1;
+      const auto expected = analyzeMotion(walk.robot, walk.motion, schedule, settings);
+      for (const DistributionStatus status : expected.status) ++count[status];
+      for (const int lanes : {4, 8}) {
+        met.insert(countLanes(walk.robot, lanes));
+        settings.lanes = lanes;
+        const auto actual = analyzeMotion(walk.robot, walk.motion, schedule, settings);
+        BOOST_TEST((actual.status == expected.status));
+        const auto numbers = numbersOf(actual), others = numbersOf(expected);
+        for (const auto& [name, values] : numbers)
+          for (Index frame = 0; frame < values.cols(); ++frame)
+            BOOST_TEST_CONTEXT(name << ", frame " << frame << ", seed " << seed) {
+              const double scale = name == "residual" ? walk.robot.getMass() * 9.81 : 1.;
+              BOOST_TEST(
+                  sameOrNaN(values.col(frame) / scale, others.at(name).col(frame) / scale, 1e-10));
+            }
+      }
+    }
+  }
+  BOOST_TEST(count[DistributionStatus::Solved] > 1000);
+  BOOST_TEST(count[DistributionStatus::Relaxed] > 100);
+  // Where the processor has them, both variants have been met.
+#if defined(__x86_64__) && defined(__linux__)
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    BOOST_TEST(met.count(4) == 1u);
+  if (__builtin_cpu_supports("avx512f")) BOOST_TEST(met.count(8) == 1u);
+#endif
+}
+
+BOOST_AUTO_TEST_CASE(robots_that_lanes_do_not_know_are_analyzed_without) {
+  Walk walk(14, 30);
+  pinocchio::Model model;
+  const auto root =
+      model.addJoint(0, pinocchio::JointModelFreeFlyer(), SE3::Identity(), "root_joint");
+  model.appendBodyToJoint(root, pinocchio::Inertia::Random());
+  const auto joint =
+      model.addJoint(root, pinocchio::JointModelSphericalZYX(), SE3::Identity(), "joint");
+  model.appendBodyToJoint(joint, pinocchio::Inertia::Random());
+  BOOST_TEST(countLanes(DynaCoM(model)) == 1);
+  BOOST_TEST(countLanes(walk.robot, 1) == 1);
+
+  // A contact of one's own.
+  struct Grip : Contact6D {
+    using Contact6D::Contact6D;
+    std::shared_ptr<ContactBase> clone() const override { return std::make_shared<Grip>(*this); }
+    SE3 getSurfacePose() const override {
+      return getPose() * SE3(Matrix3d::Identity(), Vector3d::UnitZ());
+    }
   };
-  analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
-  BOOST_REQUIRE(told.size() >= 2u);
-  for (const Index frames : told) BOOST_TEST((frames > 0 && frames <= 700));
-  BOOST_TEST(told.back() == 700);
+  Contact6DSettings settings;
+  settings.frame_name = "sole1";
+  walk.robot.addContact(std::make_shared<Grip>(settings), "grip");
+  BOOST_TEST(countLanes(walk.robot) == 1);
+  const auto result = analyzeMotion(walk.robot, walk.motion, walk.schedule);
+  BOOST_TEST(result.com.allFinite());
+  BOOST_TEST(throws<NotReadyError>([] { countLanes(DynaCoM()); }, {"initialize"}));
+}
+
+BOOST_AUTO_TEST_CASE(quaternions_that_are_nearly_normalized_are_taken_as_they_are) {
+  Walk walk(15);
+  walk.motion.q.middleRows<4>(3) *= 1. + 1e-5;
+  AnalysisSettings settings;
+  const auto actual = analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
+  settings.lanes = 1;
+  checkSameBits(actual, analyzeMotion(walk.robot, walk.motion, walk.schedule, settings));
+}
+
+BOOST_AUTO_TEST_CASE(numbers_of_threads_and_lanes_out_of_range_are_refused) {
+  const Walk walk(16);
+  AnalysisSettings settings;
+  settings.threads = -1;
+  BOOST_TEST(throws<std::invalid_argument>(
+      [&] { analyzeMotion(walk.robot, walk.motion, walk.schedule, settings); },
+      {"AnalysisSettings.threads", "-1"}));
+  settings.threads = 0;
+  settings.lanes = 0;
+  BOOST_TEST(throws<std::invalid_argument>(
+      [&] { analyzeMotion(walk.robot, walk.motion, walk.schedule, settings); },
+      {"AnalysisSettings.lanes", "0"}));
 }
 
 BOOST_AUTO_TEST_CASE(a_motion_that_is_not_valid_is_refused_by_array_and_frame) {

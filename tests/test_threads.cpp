@@ -12,7 +12,7 @@
 
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
-#include "dynacom/motion_analysis.hpp"
+#include "dynacom/motion_verdict.hpp"
 #include "feet.hpp"
 #include "random_robot.hpp"
 
@@ -145,6 +145,37 @@ Numbers work(DynaCoM robot, unsigned seed) {
   return numbers;
 }
 
+/// Random states as a motion, on ground that is flat for even seeds, in which contacts come and go.
+Numbers analyze(const DynaCoM& robot, std::size_t seed, Index frames, int threads) {
+  Random random(static_cast<unsigned>(seed));
+  const auto& model = robot.getModel();
+  Motion motion;
+  motion.time = VectorXd::LinSpaced(frames, 0., 1.);
+  motion.q.resize(model.nq, frames);
+  motion.v.resize(model.nv, frames);
+  motion.a.resize(model.nv, frames);
+  ContactSchedule schedule{robot.getKnownContacts(), ContactSchedule::Matrix(4, frames)};
+  for (Index frame = 0; frame < frames; ++frame) {
+    const State x = randomState(model, random, 0.05);
+    motion.q.col(frame) = x.q;
+    motion.v.col(frame) = x.v;
+    motion.a.col(frame) = x.a;
+    for (Index k = 0; k < 4; ++k) schedule.active(k, frame) = random.coin();
+  }
+  AnalysisSettings settings;
+  settings.flat_horizontal_ground = seed % 2 == 0;
+  settings.threads = threads;
+  Index told = 0;
+  settings.progress = [&told](Index done) { told = done; };
+  const MotionAnalysis analysis = analyzeMotion(robot, motion, schedule, settings);
+  Numbers numbers = {double(told)};
+  append(numbers, analysis.residual);
+  append(numbers, analysis.cop);
+  append(numbers, analysis.nl);
+  for (const auto& contact : analysis.contacts) append(numbers, contact.wrench);
+  return numbers;
+}
+
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(copies_in_threads_do_what_they_do_one_after_the_other) {
@@ -172,35 +203,56 @@ BOOST_AUTO_TEST_CASE(threads_may_copy_from_one_original) {
 
 BOOST_AUTO_TEST_CASE(threads_may_analyze_motions_of_one_robot) {
   const DynaCoM robot = makeRobot();
-  const auto analyze = [&](std::size_t i) {
-    Random random(static_cast<unsigned>(i));
-    const auto& model = robot.getModel();
-    Motion motion;
-    motion.time = VectorXd::LinSpaced(kFrames, 0., 1.);
-    motion.q.resize(model.nq, kFrames);
-    motion.v.resize(model.nv, kFrames);
-    motion.a.resize(model.nv, kFrames);
-    ContactSchedule schedule{robot.getKnownContacts(), ContactSchedule::Matrix(4, kFrames)};
-    for (Index frame = 0; frame < kFrames; ++frame) {
-      const State x = randomState(model, random, 0.05);
-      motion.q.col(frame) = x.q;
-      motion.v.col(frame) = x.v;
-      motion.a.col(frame) = x.a;
-      for (Index k = 0; k < 4; ++k) schedule.active(k, frame) = random.coin();
-    }
-    AnalysisSettings settings;
-    settings.flat_horizontal_ground = i % 2 == 0;
-    const MotionAnalysis analysis = analyzeMotion(robot, motion, schedule, settings);
+  std::vector<Numbers> parallel(kThreads);
+  inThreads([&](std::size_t i) { parallel[i] = analyze(robot, i, kFrames, 1); });
+  for (std::size_t i = 0; i < kThreads; ++i)
+    BOOST_TEST(sameBits(parallel[i], analyze(robot, i, kFrames, 1)));
+}
+
+BOOST_AUTO_TEST_CASE(an_analysis_has_threads_of_its_own) {
+  const DynaCoM robot = makeRobot();
+  for (const std::size_t i : {0, 1}) {
+    const Numbers serial = analyze(robot, i, 1500, 1);
+    for (const int threads : {2, 4, 8})
+      BOOST_TEST(sameBits(analyze(robot, i, 1500, threads), serial));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(contacts_and_verdicts_are_the_same_whatever_the_number_of_threads) {
+  const DynaCoM robot = makeRobot();
+  const auto& model = robot.getModel();
+  const Index frames = 1000;
+  Random random(3);
+  Motion motion{VectorXd::LinSpaced(frames, 0., 10.), MatrixXd(model.nq, frames),
+                MatrixXd(model.nv, frames), MatrixXd(model.nv, frames)};
+  ContactSchedule schedule{robot.getKnownContacts(), ContactSchedule::Matrix(4, frames)};
+  for (Index frame = 0; frame < frames; ++frame) {
+    const State x = randomState(model, random, 0.1);
+    motion.q.col(frame) = x.q;
+    motion.v.col(frame) = x.v;
+    motion.a.col(frame) = 3. * x.a;
+    for (Index k = 0; k < 4; ++k) schedule.active(k, frame) = random.integer(0, 3) == 0;
+  }
+  const MotionAnalysis analysis = analyzeMotion(robot, motion, schedule);
+  const auto judge = [&](int threads) {
     Numbers numbers;
-    append(numbers, analysis.residual);
-    append(numbers, analysis.cop);
-    append(numbers, analysis.nl);
-    for (const auto& contact : analysis.contacts) append(numbers, contact.wrench);
+    const auto contacts = computeContactMotions(robot, motion, threads);
+    for (const ContactMotion& contact : contacts) {
+      append(numbers, contact.position);
+      append(numbers, contact.rotation);
+      append(numbers, contact.height);
+      append(numbers, contact.velocity);
+    }
+    const RecordedMotion recorded{motion.q, VectorXd::Zero(frames)};
+    const MotionVerdict verdict =
+        judgeMotion(robot, motion, recorded, contacts, VectorXd::Zero(4), analysis, {}, threads);
+    for (const MotionFinding& finding : verdict.findings) append(numbers, finding.measured);
+    // It was looked for contacts that are missing.
+    BOOST_TEST(verdict[MotionFault::ContactMissing].frames > 50);
     return numbers;
   };
-  std::vector<Numbers> parallel(kThreads);
-  inThreads([&](std::size_t i) { parallel[i] = analyze(i); });
-  for (std::size_t i = 0; i < kThreads; ++i) BOOST_TEST(sameBits(parallel[i], analyze(i)));
+  const Numbers serial = judge(1);
+  for (const int threads : {2, 3, 8}) BOOST_TEST(sameBits(judge(threads), serial));
 }
 
 BOOST_AUTO_TEST_CASE(threads_may_read_robots_at_once) {

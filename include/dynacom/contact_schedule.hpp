@@ -35,10 +35,12 @@ struct ContactMotion {
 
 /// The motions of all contacts that a robot knows, in the order of getKnownContacts(), placed by
 /// the model.
+/// @param threads  as AnalysisSettings::threads
 /// @throws std::invalid_argument if the motion is not valid; NotReadyError before the robot's
 ///         initialize()
 DYNACOM_EXPORT std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot,
-                                                                const Motion& motion);
+                                                                const Motion& motion,
+                                                                int threads = 0);
 
 /// Where the ground is, and when a contact is held to touch it.
 struct DYNACOM_EXPORT DetectionSettings {

@@ -18,12 +18,26 @@ struct DYNACOM_EXPORT AnalysisSettings {
   /// ω of the virtual repellent point and the divergent component of motion [rad/s]. 0 stands for
   /// √(g / mean height of the CoM above the ground).
   double omega = 0.;
-  /// Called now and then with the number of frames done.
+  /// How many threads do the work, at most; 0 stands for as many as the machine has. Blocks of 256
+  /// frames, each of which starts cold, are what a thread takes: results are the same, bit for bit,
+  /// whatever the number of threads.
+  int threads = 0;
+  /// How many frames a thread computes at once, at most, in the lanes of SIMD registers; see
+  /// countLanes(). 1 stands for none of that. Results are the same but for rounding.
+  int lanes = kMaximalLanes;
+  /// Called now and then, in the caller's thread, with the number of frames done, which increases.
   std::function<void(Eigen::Index)> progress;
 
-  /// @throws std::invalid_argument unless omega is finite and >= 0
+  static constexpr int kMaximalLanes = 8;
+
+  /// @throws std::invalid_argument unless omega is finite and >= 0, threads >= 0 and lanes >= 1
   void validate() const;
 };
+
+/// How many lanes this machine has for a robot, and no more than so many: 8 with AVX-512, 4 with
+/// AVX2, and 1 where there is neither, or the robot has joints or contacts that lanes do not know.
+/// @throws NotReadyError before the robot's initialize()
+DYNACOM_EXPORT int countLanes(const DynaCoM& robot, int lanes = AnalysisSettings::kMaximalLanes);
 
 /// What analyzeMotion() found: one column per frame, in the world's axes, SI units.
 struct MotionAnalysis {

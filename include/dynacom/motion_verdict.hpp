@@ -105,6 +105,7 @@ struct RecordedMotion {
 /// @param contacts  of computeContactMotions() for the same robot and motion
 /// @param ground    height of the ground under each contact, see estimateGround() [m]
 /// @param analysis  of analyzeMotion() for the same robot and motion
+/// @param threads   as AnalysisSettings::threads
 /// @throws std::invalid_argument if settings or motion are not valid, or sizes differ;
 ///         NotReadyError before the robot's initialize()
 DYNACOM_EXPORT MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
@@ -112,6 +113,6 @@ DYNACOM_EXPORT MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& mot
                                          const std::vector<ContactMotion>& contacts,
                                          const Eigen::VectorXd& ground,
                                          const MotionAnalysis& analysis,
-                                         const VerdictSettings& settings = {});
+                                         const VerdictSettings& settings = {}, int threads = 0);
 
 }  // namespace dynacom

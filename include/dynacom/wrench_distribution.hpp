@@ -195,6 +195,10 @@ class DYNACOM_EXPORT WrenchDistribution {
   /// The last solve()'s answer.
   const DistributionResult& result() const;
 
+  /// Forgets all answers: the next solve() starts from no inequality, and without an answer its
+  /// forces are zero. What comes then does not depend on what was before.
+  void forgetAnswers();
+
   /// Forgets the forces that a solve() without an answer would keep: until there is one again, they
   /// are zero. For contacts that are others than before, but have the same matrices.
   void forgetForces();

@@ -100,7 +100,7 @@ def test_every_frame_as_by_hand(robot, arrays, motion, active, schedule, flat):
     """The same as a loop over frames with one's own DynaCoM."""
     robot.setGroundHeight(-0.5)
     robot.setWarmStart(False)  # so that the same problem again takes the same steps
-    analysis = dynacom.analyzeMotion(robot, motion, schedule, flat, 2.0)
+    analysis = dynacom.analyzeMotion(robot, motion, schedule, flat, 2.0, lanes=1)
     own = robot.copy()
     for name in own.getKnownContacts():
         own.deactivateContact(name)

@@ -15,7 +15,16 @@ import yaml
 from scipy.optimize import brentq
 
 from conftest import put_on_ground
-from dynacom import Contact6DSettings, ContactPointSettings, DistributionStatus, DynacomError
+from dynacom import (
+    Contact6DSettings,
+    ContactPointSettings,
+    ContactSchedule,
+    DistributionStatus,
+    DynacomError,
+    Motion,
+    analyzeMotion,
+    countLanes,
+)
 from dynacom.robots import (
     list_robots,
     load_robot,
@@ -115,6 +124,55 @@ def bears_its_weight(robot, q):
     forces = [dynamics.getContact(contact).toWorldForces()[2] for contact in robot.contacts]
     assert min(forces) > 0.1 * 9.81 * dynamics.getMass()
     assert sum(forces) == pytest.approx(9.81 * dynamics.getMass(), rel=1e-9)
+
+
+@pytest.mark.parametrize("flat", [True, False])
+@pytest.mark.parametrize("name", ROBOTS)
+def test_lanes(name, flat):
+    """Several frames at once are what each frame is on its own."""
+    robot = load_robot(name)
+    model, frames = robot.model, 101
+    rng = np.random.default_rng(0)
+    steps = 0.05 * rng.standard_normal((frames, model.nv))
+    motion = Motion(
+        np.arange(frames) / 50.0,
+        np.array([pin.integrate(model, facing_x(robot), step) for step in steps]),
+        0.2 * rng.standard_normal((frames, model.nv)),
+        0.3 * rng.standard_normal((frames, model.nv)),
+    )
+    active = rng.random((frames, len(robot.contacts))) < 0.9
+    schedule = ContactSchedule(list(robot.contacts), active)
+    dynamics = robot.dynacom()
+    expected = analyzeMotion(dynamics, motion, schedule, flat, omega=3.0, lanes=1)
+    # Bolt's two points cannot give any wrench.
+    assert expected.status.count(DistributionStatus.Solved) > 10 or name == "bolt"
+    for lanes in (4, 8):
+        found = analyzeMotion(dynamics, motion, schedule, flat, omega=3.0, lanes=lanes)
+        assert found.status == expected.status
+        weight = 9.81 * dynamics.getMass()
+        for key in ("com", "vcom", "acom", "am", "dam", "ground_force", "ground_torque", "cop"):
+            assert_same(getattr(found, key), getattr(expected, key))
+        for key in ("feasible_acom", "feasible_dam", "vrp", "nl", "dcm"):
+            assert_same(getattr(found, key), getattr(expected, key))
+        assert_same(found.residual / weight, expected.residual / weight)
+        for one, other in zip(found.contacts, expected.contacts, strict=True):
+            assert_same(one.wrench / weight, other.wrench / weight)
+            for key in ("cop", "friction_usage", "yaw_usage", "cop_margin"):
+                assert_same(getattr(one, key), getattr(other, key))
+
+
+def test_lanes_are_there():
+    """Where Linux says that the processor has them."""
+    cpuinfo = Path("/proc/cpuinfo")
+    flags = set(re.findall(r"\w+", cpuinfo.read_text())) if cpuinfo.exists() else set()
+    lanes = 8 if "avx512f" in flags else 4 if {"avx2", "fma"} <= flags else 1
+    for name in ROBOTS:
+        assert countLanes(load_robot(name).dynacom()) == lanes
+
+
+def assert_same(actual, expected):
+    scale = max(1.0, np.abs(np.nan_to_num(expected)).max())
+    np.testing.assert_allclose(actual / scale, expected / scale, rtol=0.0, atol=1e-10)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

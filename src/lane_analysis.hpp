@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "dynacom/motion_analysis.hpp"
+#include "lanes.hpp"
+
+namespace dynacom::internal {
+
+/// Several frames of analyzeMotion() at once: a robot as lanes know it, and the shared object that
+/// this processor can run.
+class LaneRobot {
+ public:
+  /// Nothing, where there is no such object, or where the robot has joints or contacts of other
+  /// kinds.
+  /// @param lanes  at most so many frames at once
+  static std::optional<LaneRobot> make(const DynaCoM& robot, bool flat_horizontal_ground,
+                                       int lanes);
+
+  int lanes() const { return interface_->lanes; }
+
+ private:
+  friend class LaneAnalysis;
+  LaneRobot() = default;
+
+  const lanes::Interface* interface_ = nullptr;
+  lanes::Robot robot_ = {};
+  std::vector<lanes::Joint> joints_;
+  std::vector<lanes::Contact> contacts_;
+};
+
+/// What a thread has for that.
+class LaneAnalysis {
+ public:
+  /// @throws std::bad_alloc
+  explicit LaneAnalysis(const LaneRobot& robot);
+
+  /// Analyzes some frames of a motion, as far as lanes do.
+  /// @param result  with storage for all frames, and the contacts' active in place
+  void run(const Motion& motion, Eigen::Index first, Eigen::Index frames, MotionAnalysis& result);
+
+  /// Of the last run(), for a frame counted from its first.
+  lanes::Outcome outcome(Eigen::Index frame) const {
+    return outcomes_[static_cast<std::size_t>(frame)];
+  }
+  /// Placement of a contact's frame in the world, where the contact is active.
+  pinocchio::SE3 placement(std::size_t contact, Eigen::Index frame) const;
+
+ private:
+  const LaneRobot& robot_;
+  std::unique_ptr<void, void (*)(void*)> analysis_;
+  std::vector<lanes::ContactRows> rows_;
+  std::vector<lanes::Outcome> outcomes_;
+  std::vector<double> placements_;
+};
+
+}  // namespace dynacom::internal

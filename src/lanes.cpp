@@ -1,0 +1,610 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "lanes.hpp"
+
+#include <algorithm>
+#include <experimental/simd>
+#include <limits>
+#include <new>
+#include <vector>
+
+namespace dynacom::lanes {
+namespace {
+
+namespace stdx = std::experimental;
+
+// A number of each frame, and whether something is so in each.
+using Lanes = stdx::native_simd<double>;
+using Mask = Lanes::mask_type;
+constexpr int kLanes = static_cast<int>(Lanes::size());
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// By how much a quaternion's squared norm may differ from 1: more, and algorithms differ.
+constexpr double kNormalized = 1e-12;
+// What part of the largest pivot the least must be, so that the contacts give all wrenches.
+constexpr double kFullRank = 1e-6;
+// What part of the wrench an answer may lack.
+constexpr double kMissing = 1e-12;
+
+// Vectors and matrices in three dimensions, the latter by their columns.
+struct Vector {
+  Lanes x, y, z;
+};
+struct Matrix {
+  Vector x, y, z;
+};
+
+inline Vector operator+(const Vector& a, const Vector& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+inline Vector operator-(const Vector& a, const Vector& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+inline Vector operator*(const Lanes& s, const Vector& a) { return {s * a.x, s * a.y, s * a.z}; }
+inline Vector& operator+=(Vector& a, const Vector& b) { return a = a + b; }
+inline Lanes dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vector cross(const Vector& a, const Vector& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline Vector operator*(const Matrix& m, const Vector& a) {
+  return a.x * m.x + a.y * m.y + a.z * m.z;
+}
+inline Matrix operator*(const Matrix& m, const Matrix& n) { return {m * n.x, m * n.y, m * n.z}; }
+inline Vector transposed(const Matrix& m, const Vector& a) {
+  return {dot(m.x, a), dot(m.y, a), dot(m.z, a)};
+}
+inline Vector broadcast(const double* a) { return {a[0], a[1], a[2]}; }
+inline Matrix broadcastMatrix(const double* m) {
+  return {broadcast(m), broadcast(m + 3), broadcast(m + 6)};
+}
+inline Vector zero() { return {0., 0., 0.}; }
+inline Matrix identity() { return {{1., 0., 0.}, {0., 1., 0.}, {0., 0., 1.}}; }
+
+// As Eigen has it.
+inline Matrix rotationOf(const Lanes& x, const Lanes& y, const Lanes& z, const Lanes& w) {
+  const Lanes tx = 2. * x, ty = 2. * y, tz = 2. * z;
+  const Lanes xx = tx * x, xy = tx * y, xz = tx * z, yy = ty * y, yz = ty * z, zz = tz * z;
+  const Lanes wx = tx * w, wy = ty * w, wz = tz * w;
+  return {{1. - (yy + zz), xy + wz, xz - wy},
+          {xy - wz, 1. - (xx + zz), yz + wx},
+          {xz + wy, yz - wx, 1. - (xx + yy)}};
+}
+
+// How a joint's frame moves, in the world's axes: velocity and acceleration are those of its origin
+// as a point.
+struct Moving {
+  Matrix rotation;
+  Vector position, angular_velocity, velocity, angular_acceleration, acceleration;
+};
+
+// L D Lᵀ of a symmetric 6 × 6 matrix, in place: L below the diagonal, 1/D on it.
+struct Factors {
+  Lanes m[6][6];
+  Lanes least_pivot, largest_pivot;
+
+  void compute() {
+    for (int j = 0; j < 6; ++j) {
+      const Lanes pivot = m[j][j];
+      least_pivot = j == 0 ? pivot : stdx::min(least_pivot, pivot);
+      largest_pivot = j == 0 ? pivot : stdx::max(largest_pivot, pivot);
+      const Lanes inverse = 1. / pivot;
+      m[j][j] = inverse;
+      Lanes column[6];
+      for (int i = j + 1; i < 6; ++i) {
+        column[i] = m[i][j];
+        m[i][j] *= inverse;
+      }
+      for (int i = j + 1; i < 6; ++i)
+        for (int k = j + 1; k <= i; ++k) m[i][k] -= m[i][j] * column[k];
+    }
+  }
+
+  void solve(Lanes* x) const {
+    for (int j = 0; j < 6; ++j)
+      for (int i = j + 1; i < 6; ++i) x[i] -= m[i][j] * x[j];
+    for (int j = 0; j < 6; ++j) x[j] *= m[j][j];
+    for (int j = 5; j > 0; --j)
+      for (int i = 0; i < j; ++i) x[i] -= m[j][i] * x[j];
+  }
+};
+
+class Analysis {
+ public:
+  explicit Analysis(const Robot& robot)
+      : robot_(robot),
+        joints_(robot.joint, robot.joint + robot.joints),
+        contacts_(robot.contact, robot.contact + robot.contacts),
+        moving_(joints_.size()),
+        standing_(contacts_.size()) {
+    mass_ = 0.;
+    for (const Joint& joint : joints_) mass_ += joint.mass;
+  }
+
+  void run(const Frames& frames) {
+    for (first_ = 0; first_ < frames.count; first_ += kLanes) {
+      count_ = static_cast<int>(std::min<std::ptrdiff_t>(kLanes, frames.count - first_));
+      for (int lane = 0; lane < kLanes; ++lane) {  // those too many do what the last one does
+        const std::ptrdiff_t frame = first_ + std::min(lane, count_ - 1);
+        q_[lane] = frames.q + frame * robot_.nq;
+        v_[lane] = frames.v + frame * robot_.nv;
+        a_[lane] = frames.a + frame * robot_.nv;
+      }
+      computeDynamics(frames);
+      distribute(frames);
+    }
+  }
+
+ private:
+  // A contact as it stands in the frames at hand.
+  struct Standing {
+    Lanes is_active;  // 1 or 0
+    bool takes_part;  // in any frame
+    Matrix rotation;  // of its surface
+    Vector lever;     // from the CoM to the surface's origin
+    Vector moments[3];
+    Lanes force[6];
+  };
+
+  // The numbers of a component, which must be finite.
+  Lanes load(const double* const* columns, int row) {
+    const Lanes numbers([&](auto lane) { return columns[lane][row]; });
+    nothing_ += 0. * numbers;
+    return numbers;
+  }
+  Vector loadVector(const double* const* columns, int row) {
+    const Lanes x = load(columns, row), y = load(columns, row + 1);
+    return {x, y, load(columns, row + 2)};
+  }
+  void requireNormalized(const Lanes& squared_norm) {
+    normalized_ = normalized_ && stdx::abs(squared_norm - 1.) <= kNormalized;
+  }
+  Matrix loadRotation(int row) {
+    const Lanes x = load(q_, row), y = load(q_, row + 1), z = load(q_, row + 2),
+                w = load(q_, row + 3);
+    requireNormalized(x * x + y * y + z * z + w * w);
+    return rotationOf(x, y, z, w);
+  }
+
+  template <int kRows>
+  void store(double* columns, int rows, int first_row, const Lanes (&values)[kRows]) const {
+    double buffer[kRows][kLanes];
+    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
+    double* column = columns + first_ * rows + first_row;
+    for (int lane = 0; lane < count_; ++lane, column += rows)
+      for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
+  }
+  void store(double* columns, const Vector& values) const {
+    store(columns, 3, 0, {values.x, values.y, values.z});
+  }
+  // The same, where something is so.
+  template <int kRows>
+  void storeWhere(const Mask& mask, double* columns, const Lanes (&values)[kRows]) const {
+    double buffer[kRows][kLanes];
+    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
+    double* column = columns + first_ * kRows;
+    for (int lane = 0; lane < count_; ++lane, column += kRows)
+      if (mask[lane])
+        for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
+  }
+
+  Moving move(const Joint& joint);
+  void addBody(const Joint& joint, const Moving& moving);
+  void computeDynamics(const Frames& frames);
+  void place(const Frames& frames);
+  Mask findForces();
+  void distribute(const Frames& frames);
+  void storeContact(const Frames& frames, std::size_t k, const Mask& answered) const;
+
+  const Robot robot_;
+  const std::vector<Joint> joints_;
+  const std::vector<Contact> contacts_;
+  double mass_;
+  std::vector<Moving> moving_;      // by joint
+  std::vector<Standing> standing_;  // by contact
+
+  // Of the frames at hand.
+  std::ptrdiff_t first_ = 0;
+  int count_ = 0;
+  const double *q_[kLanes], *v_[kLanes], *a_[kLanes];
+  Lanes nothing_;    // zero, if all numbers are finite
+  Mask normalized_;  // all quaternions
+  // Sums over the bodies, about the first joint: mass times place, velocity, acceleration; angular
+  // momentum and its rate.
+  Vector centre_, places_, momentum_, momentum_rate_, angular_momentum_, angular_momentum_rate_;
+  Vector com_, force_, torque_;
+  Lanes wrench_[6], achieved_[6];
+};
+
+Moving Analysis::move(const Joint& joint) {
+  Moving at;  // the joint, before it moves
+  Vector arm;
+  const Vector offset = broadcast(joint.placement + 9);
+  const Moving* parent = nullptr;
+  if (joint.parent < 0) {
+    at.rotation = broadcastMatrix(joint.placement);
+    at.position = arm = offset;
+    at.angular_velocity = at.velocity = at.angular_acceleration = at.acceleration = zero();
+  } else {
+    parent = &moving_[static_cast<std::size_t>(joint.parent)];
+    at = *parent;
+    at.rotation = parent->rotation * broadcastMatrix(joint.placement);
+    arm = parent->rotation * offset;
+    at.position += arm;
+  }
+  // What a point of the parent does, at an arm from its joint.
+  const auto carry = [&] {
+    if (!parent) return;
+    const Vector around = cross(parent->angular_velocity, arm);
+    at.velocity = parent->velocity + around;
+    at.acceleration = parent->acceleration + cross(parent->angular_acceleration, arm) +
+                      cross(parent->angular_velocity, around);
+  };
+
+  switch (joint.kind) {
+    case JointKind::Revolute:
+    case JointKind::UnboundedRevolute: {
+      Lanes cosine, sine;
+      if (joint.kind == JointKind::Revolute) {
+        const Lanes angle = load(q_, joint.q);
+        cosine = stdx::cos(angle);
+        sine = stdx::sin(angle);
+      } else {
+        cosine = load(q_, joint.q);
+        sine = load(q_, joint.q + 1);
+        requireNormalized(cosine * cosine + sine * sine);
+      }
+      carry();
+      const Vector x = at.rotation.x, y = at.rotation.y;
+      at.rotation.x = cosine * x + sine * y;
+      at.rotation.y = cosine * y - sine * x;
+      const Vector rate = load(v_, joint.v) * at.rotation.z;
+      at.angular_acceleration += load(a_, joint.v) * at.rotation.z;
+      at.angular_acceleration += cross(at.angular_velocity, rate);
+      at.angular_velocity += rate;
+      return at;
+    }
+    case JointKind::Prismatic: {
+      const Vector moved = load(q_, joint.q) * at.rotation.z;
+      at.position += moved;
+      arm += moved;
+      carry();
+      const Vector rate = load(v_, joint.v) * at.rotation.z;
+      at.velocity += rate;
+      at.acceleration += load(a_, joint.v) * at.rotation.z;
+      at.acceleration += Lanes(2.) * cross(at.angular_velocity, rate);
+      return at;
+    }
+    default:
+      break;
+  }
+
+  // Those with several components: of which velocities are in the moving frame's axes.
+  Matrix rotation = identity();
+  Vector position = zero(), velocity = zero(), spin = zero();
+  Vector velocity_rate = zero(), spin_rate = zero();
+  switch (joint.kind) {
+    case JointKind::FreeFlyer:
+      position = loadVector(q_, joint.q);
+      rotation = loadRotation(joint.q + 3);
+      velocity = loadVector(v_, joint.v);
+      velocity_rate = loadVector(a_, joint.v);
+      spin = loadVector(v_, joint.v + 3);
+      spin_rate = loadVector(a_, joint.v + 3);
+      break;
+    case JointKind::Spherical:
+      rotation = loadRotation(joint.q);
+      spin = loadVector(v_, joint.v);
+      spin_rate = loadVector(a_, joint.v);
+      break;
+    case JointKind::Translation:
+      position = loadVector(q_, joint.q);
+      velocity = loadVector(v_, joint.v);
+      velocity_rate = loadVector(a_, joint.v);
+      break;
+    default: {  // planar
+      position.x = load(q_, joint.q);
+      position.y = load(q_, joint.q + 1);
+      const Lanes cosine = load(q_, joint.q + 2), sine = load(q_, joint.q + 3);
+      requireNormalized(cosine * cosine + sine * sine);
+      rotation.x = {cosine, sine, 0.};
+      rotation.y = {-sine, cosine, 0.};
+      velocity = {load(v_, joint.v), load(v_, joint.v + 1), 0.};
+      velocity_rate = {load(a_, joint.v), load(a_, joint.v + 1), 0.};
+      spin.z = load(v_, joint.v + 2);
+      spin_rate.z = load(a_, joint.v + 2);
+    }
+  }
+  const Vector moved = at.rotation * position;
+  at.position += moved;
+  arm += moved;
+  carry();
+  at.rotation = at.rotation * rotation;
+  const Vector rate = at.rotation * velocity, turning = at.rotation * spin;
+  at.velocity += rate;
+  at.acceleration += Lanes(2.) * cross(at.angular_velocity, rate) +
+                     at.rotation * (velocity_rate + cross(spin, velocity));
+  at.angular_acceleration += at.rotation * spin_rate + cross(at.angular_velocity, turning);
+  at.angular_velocity += turning;
+  return at;
+}
+
+void Analysis::addBody(const Joint& joint, const Moving& moving) {
+  if (joint.mass == 0.) return;
+  const Vector arm = moving.rotation * broadcast(joint.com);
+  const Vector around = cross(moving.angular_velocity, arm);
+  const Lanes mass = joint.mass;
+  const Vector place = moving.position - centre_ + arm;
+  const Vector momentum = mass * (moving.velocity + around);
+  const Vector momentum_rate =
+      mass * (moving.acceleration + cross(moving.angular_acceleration, arm) +
+              cross(moving.angular_velocity, around));
+  places_ += mass * place;
+  momentum_ += momentum;
+  momentum_rate_ += momentum_rate;
+
+  const double* I = joint.inertia;
+  const auto times = [I](const Vector& a) {
+    return Vector{I[0] * a.x + I[1] * a.y + I[3] * a.z, I[1] * a.x + I[2] * a.y + I[4] * a.z,
+                  I[3] * a.x + I[4] * a.y + I[5] * a.z};
+  };
+  const Vector spin = transposed(moving.rotation, moving.angular_velocity);
+  const Vector own = times(spin);
+  const Vector own_rate =
+      times(transposed(moving.rotation, moving.angular_acceleration)) + cross(spin, own);
+  angular_momentum_ += moving.rotation * own + cross(place, momentum);
+  angular_momentum_rate_ += moving.rotation * own_rate + cross(place, momentum_rate);
+}
+
+// Newton and Euler (1, 2), and the centre of pressure (5).
+void Analysis::computeDynamics(const Frames& frames) {
+  nothing_ = 0.;
+  normalized_ = Mask(true);
+  places_ = momentum_ = momentum_rate_ = angular_momentum_ = angular_momentum_rate_ = zero();
+  for (std::size_t k = 0; k < joints_.size(); ++k) {
+    moving_[k] = move(joints_[k]);
+    if (k == 0) centre_ = moving_[0].position;
+    addBody(joints_[k], moving_[k]);
+  }
+  const Lanes inverse_mass = 1. / mass_;
+  const Vector place = inverse_mass * places_;
+  const Vector acom = inverse_mass * momentum_rate_;
+  const Vector am = angular_momentum_ - cross(place, momentum_);
+  com_ = centre_ + place;
+  force_ = momentum_rate_ - Lanes(mass_) * broadcast(robot_.gravity);
+  torque_ = angular_momentum_rate_ - cross(place, momentum_rate_);
+  store(frames.com, com_);
+  store(frames.vcom, inverse_mass * momentum_);
+  store(frames.acom, acom);
+  store(frames.am, am);
+  store(frames.dam, torque_);
+  store(frames.force, force_);
+  store(frames.torque, torque_);
+  for (const Vector& vector : {com_, momentum_, am, force_, torque_})
+    nothing_ += 0. * (vector.x + vector.y + vector.z);
+
+  if (!robot_.flat_horizontal_ground) return;
+  const Lanes height = com_.z - robot_.ground_height;
+  Lanes x = com_.x + (-torque_.y - force_.x * height) / force_.z;
+  Lanes y = com_.y + (torque_.x - force_.y * height) / force_.z;
+  const Mask undefined = !(force_.z >= robot_.minimal_vertical_force) || !(0. * (x + y) == 0.);
+  stdx::where(undefined, x) = kNaN;
+  stdx::where(undefined, y) = kNaN;
+  store(frames.cop, 2, 0, {x, y});
+}
+
+void Analysis::place(const Frames& frames) {
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    const Contact& contact = contacts_[k];
+    Standing& standing = standing_[k];
+    const bool* active = frames.contacts[k].active + first_;
+    standing.is_active =
+        Lanes([&](auto lane) { return active[std::min<int>(lane, count_ - 1)] ? 1. : 0.; });
+    standing.takes_part = stdx::any_of(standing.is_active > 0.);
+    if (!standing.takes_part) continue;
+    const Moving& parent = moving_[static_cast<std::size_t>(contact.parent)];
+    standing.rotation = parent.rotation * broadcastMatrix(contact.placement);
+    Vector origin = parent.position + parent.rotation * broadcast(contact.placement + 9);
+    const int rows = 12 * robot_.contacts, row = 12 * static_cast<int>(k);
+    const Matrix& R = standing.rotation;
+    store(frames.placements, rows, row,
+          {R.x.x, R.x.y, R.x.z, R.y.x, R.y.y, R.y.z, R.z.x, R.z.y, R.z.z, origin.x, origin.y,
+           origin.z});
+    if (contact.world_aligned) standing.rotation = identity();
+    origin = origin - Lanes(contact.radius) * standing.rotation.z;
+    standing.lever = origin - com_;
+    standing.moments[0] = cross(standing.lever, standing.rotation.x);
+    standing.moments[1] = cross(standing.lever, standing.rotation.y);
+    standing.moments[2] = cross(standing.lever, standing.rotation.z);
+  }
+}
+
+// The cheapest forces that give the wrench, whatever inequalities say: the multipliers ν solve
+// NE W⁻² NEᵀ ν = w, and λ = W⁻² NEᵀ ν. Says where all inequalities hold.
+Mask Analysis::findForces() {
+  const double* D = robot_.wrench_weights;
+  Factors factors;
+  Lanes compliance[6][6];
+  for (auto& row : compliance)
+    for (Lanes& number : row) number = 0.;
+  // Components whose bound is zero have no force.
+  const auto isFree = [](const Contact& contact, int i) { return i == 2 || contact.betas[i] > 0.; };
+  const auto add = [&](const Lanes& scale, const Lanes* column, int first) {
+    for (int j = first; j < 6; ++j) {
+      const Lanes scaled = scale * column[j];
+      for (int i = j; i < 6; ++i) compliance[i][j] += scaled * column[i];
+    }
+  };
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    const Contact& contact = contacts_[k];
+    const Standing& standing = standing_[k];
+    if (!standing.takes_part) continue;
+    const Vector* axes[3] = {&standing.rotation.x, &standing.rotation.y, &standing.rotation.z};
+    for (int i = 0; i < contact.size; ++i) {
+      if (!isFree(contact, i)) continue;
+      const Vector& axis = *axes[i % 3];
+      const Lanes scale = standing.is_active / (contact.weights[i] * contact.weights[i]);
+      if (i < 3) {
+        const Vector& moment = standing.moments[i];
+        const Lanes column[6] = {axis.x, axis.y, axis.z, moment.x, moment.y, moment.z};
+        add(scale, column, 0);
+      } else {
+        const Lanes column[6] = {0., 0., 0., axis.x, axis.y, axis.z};
+        add(scale, column, 3);
+      }
+    }
+  }
+  for (int j = 0; j < 6; ++j)
+    for (int i = j; i < 6; ++i) factors.m[i][j] = compliance[i][j] *= D[i] * D[j];
+  factors.compute();
+  Mask answered = factors.least_pivot > kFullRank * factors.largest_pivot;
+
+  Lanes multipliers[6], missing[6], size = 0.;
+  for (int i = 0; i < 6; ++i) {
+    missing[i] = D[i] * wrench_[i];
+    multipliers[i] = missing[i];
+    size += missing[i] * missing[i];
+  }
+  factors.solve(multipliers);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      missing[i] -= compliance[std::max(i, j)][std::min(i, j)] * multipliers[j];
+  factors.solve(missing);
+  for (int i = 0; i < 6; ++i) multipliers[i] = D[i] * (multipliers[i] + missing[i]);
+
+  const Vector of_force = {multipliers[0], multipliers[1], multipliers[2]};
+  const Vector of_moment = {multipliers[3], multipliers[4], multipliers[5]};
+  Vector force = zero(), moment = zero();
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    const Contact& contact = contacts_[k];
+    Standing& standing = standing_[k];
+    if (!standing.takes_part) continue;
+    const Matrix& R = standing.rotation;
+    const Vector pull = transposed(R, of_force), turn = transposed(R, of_moment);
+    const Lanes pulls[6] = {pull.x + dot(standing.moments[0], of_moment),
+                            pull.y + dot(standing.moments[1], of_moment),
+                            pull.z + dot(standing.moments[2], of_moment),
+                            turn.x,
+                            turn.y,
+                            turn.z};
+    for (int i = 0; i < 6; ++i) {
+      const bool free = i < contact.size && isFree(contact, i);
+      const double weight = contact.weights[i];
+      standing.force[i] = free ? standing.is_active * pulls[i] / (weight * weight) : Lanes(0.);
+    }
+    const Lanes* f = standing.force;
+    const Vector own = R * Vector{f[0], f[1], f[2]};
+    force += own;
+    moment += cross(standing.lever, own) + R * Vector{f[3], f[4], f[5]};
+    Mask inside = f[2] > 0.;
+    for (int i = 0; i < contact.size; ++i)
+      if (i != 2) inside = inside && stdx::abs(f[i]) <= contact.betas[i] * f[2];
+    answered = answered && (inside || standing.is_active == 0.);
+  }
+  const Lanes achieved[6] = {force.x, force.y, force.z, moment.x, moment.y, moment.z};
+  Lanes distance = 0.;
+  for (int i = 0; i < 6; ++i) {
+    achieved_[i] = achieved[i];
+    const Lanes lacking = D[i] * (wrench_[i] - achieved[i]);
+    distance += lacking * lacking;
+  }
+  return answered && distance <= kMissing * kMissing * size;
+}
+
+void Analysis::distribute(const Frames& frames) {
+  const Lanes wrench[6] = {force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z};
+  for (int i = 0; i < 6; ++i) wrench_[i] = wrench[i];
+  place(frames);
+  const Mask known = normalized_ && nothing_ == 0.;
+  const Mask answered = known && findForces();
+  for (int lane = 0; lane < count_; ++lane)
+    frames.outcomes[first_ + lane] = answered[lane] ? Outcome::Everything
+                                     : known[lane]  ? Outcome::Dynamics
+                                                    : Outcome::Nothing;
+
+  const Lanes inverse_mass = 1. / mass_;
+  const Vector acom =
+      inverse_mass * Vector{achieved_[0], achieved_[1], achieved_[2]} + broadcast(robot_.gravity);
+  store(frames.feasible_acom, acom);
+  store(frames.feasible_dam, Vector{achieved_[3], achieved_[4], achieved_[5]});
+  Lanes residual[6];
+  for (int i = 0; i < 6; ++i) residual[i] = wrench_[i] - achieved_[i];
+  store(frames.residual, 6, 0, residual);
+  for (std::size_t k = 0; k < contacts_.size(); ++k)
+    if (standing_[k].takes_part) storeContact(frames, k, answered);
+
+  if (robot_.flat_horizontal_ground) return;
+  // The mean of the contacts' own centres of pressure, weighted by their vertical forces (6).
+  Vector moment = zero();
+  Lanes vertical_force = 0.;
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    const Standing& standing = standing_[k];
+    if (!standing.takes_part) continue;
+    const Lanes* f = standing.force;
+    const Matrix& R = standing.rotation;
+    Lanes inverse = 1. / f[2];
+    stdx::where(standing.is_active == 0., inverse) = 0.;
+    const Lanes vertical = R.x.z * f[0] + R.y.z * f[1] + R.z.z * f[2];
+    const Vector centre = com_ + standing.lever + (-f[4] * inverse) * R.x + (f[3] * inverse) * R.y;
+    moment += vertical * centre;
+    vertical_force += vertical;
+  }
+  Lanes x = moment.x / vertical_force, y = moment.y / vertical_force;
+  const Mask undefined =
+      !(vertical_force >= robot_.minimal_vertical_force) || !(0. * (x + y) == 0.);
+  stdx::where(undefined, x) = kNaN;
+  stdx::where(undefined, y) = kNaN;
+  store(frames.cop, 2, 0, {x, y});
+}
+
+// As ContactBase and DynaCoM have it.
+void Analysis::storeContact(const Frames& frames, std::size_t k, const Mask& answered) const {
+  const Contact& contact = contacts_[k];
+  const Standing& standing = standing_[k];
+  const ContactRows& rows = frames.contacts[k];
+  const Lanes* f = standing.force;
+  const Matrix& R = standing.rotation;
+  const Mask written = answered && standing.is_active > 0.;
+  const Mask unloaded = f[2] < robot_.minimal_vertical_force;
+  const Lanes inverse = 1. / f[2];
+  const bool is_surface = contact.size == 6;
+
+  storeWhere(written, rows.wrench, standing.force);
+  storeWhere<1>(written, rows.vertical_force, {R.x.z * f[0] + R.y.z * f[1] + R.z.z * f[2]});
+  Lanes x = is_surface ? -f[4] * inverse : Lanes(0.), y = is_surface ? f[3] * inverse : Lanes(0.);
+  Lanes margin = is_surface
+                     ? stdx::min(contact.betas[4] - stdx::abs(x), contact.betas[3] - stdx::abs(y))
+                     : Lanes(kNaN);
+  for (Lanes* number : {&x, &y, &margin}) stdx::where(unloaded, *number) = kNaN;
+  storeWhere<2>(written, rows.cop, {x, y});
+  storeWhere<1>(written, rows.cop_margin, {margin});
+  const auto usage = [&](const Lanes& size, double beta) {
+    if (!(beta > 0.)) return Lanes(kNaN);
+    Lanes part = size * inverse / beta;
+    stdx::where(unloaded, part) = 0.;
+    return part;
+  };
+  storeWhere<1>(written, rows.friction_usage,
+                {usage(stdx::max(stdx::abs(f[0]), stdx::abs(f[1])), contact.betas[0])});
+  storeWhere<1>(written, rows.yaw_usage,
+                {usage(stdx::abs(f[5]), is_surface ? contact.betas[5] : 0.)});
+}
+
+void* create(const Robot* robot) {
+  try {
+    return new Analysis(*robot);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+}
+
+void run(void* analysis, const Frames* frames) { static_cast<Analysis*>(analysis)->run(*frames); }
+
+void destroy(void* analysis) { delete static_cast<Analysis*>(analysis); }
+
+constexpr Interface kInterface = {kInterfaceSize, kLanes, &create, &run, &destroy};
+
+}  // namespace
+}  // namespace dynacom::lanes
+
+extern "C" [[gnu::visibility("default")]] const dynacom::lanes::Interface* dynacom_lanes() {
+  return &dynacom::lanes::kInterface;
+}

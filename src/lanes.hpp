@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <cstddef>
+
+// What crosses between the library and its lanes: the per-frame mathematics of analyzeMotion() for
+// several frames at once, one in each lane of a SIMD register. lanes.cpp is compiled once for each
+// width that registers may have, each time with flags of its own, into a shared object of its own:
+// hence plain arrays, and nothing of Eigen, Pinocchio or the standard library.
+//
+// Placements are twelve numbers: the rotation, column by column, and the translation.
+
+namespace dynacom::lanes {
+
+enum class JointKind : int {
+  Revolute,           // about z
+  UnboundedRevolute,  // the same, by cosine and sine
+  Prismatic,          // along z
+  FreeFlyer,
+  Spherical,
+  Translation,
+  Planar,
+};
+
+/// A joint with its body.
+struct Joint {
+  JointKind kind;
+  int parent;            // index of another joint before it, −1 for the world
+  int q, v;              // its first components in configuration and velocity
+  double placement[12];  // in the parent joint's frame
+  double mass;
+  double com[3];      // in the joint's frame
+  double inertia[6];  // about the CoM, in the joint's axes: xx, xy, yy, xz, yz, zz
+};
+
+/// A contact whose forces are limited by |λᵢ| ≤ βᵢ λ_z.
+struct Contact {
+  int size;              // 3 or 6 components
+  int parent;            // joint
+  double placement[12];  // of its frame in the parent joint's
+  bool world_aligned;
+  double radius;
+  double betas[6];    // the third is not used
+  double weights[6];  // of the cost
+};
+
+struct Robot {
+  int nq, nv, joints, contacts;
+  const Joint* joint;
+  const Contact* contact;
+  double gravity[3];
+  double wrench_weights[6];
+  double ground_height, minimal_vertical_force;
+  bool flat_horizontal_ground;
+};
+
+/// Which part of a frame's results is there.
+enum class Outcome : unsigned char {
+  Everything,  // no inequality is active
+  Dynamics,    // all but distribution and contacts
+  Nothing,     // numbers are not finite, or quaternions have another norm than 1
+};
+
+/// Where results of a contact go; see MotionAnalysis::Contact. Written where it is active and the
+/// outcome is Everything.
+struct ContactRows {
+  const bool* active;
+  double *wrench, *vertical_force, *cop, *friction_usage, *yaw_usage, *cop_margin;
+};
+
+/// Where frames are, one behind the other, and where results go; see MotionAnalysis.
+struct Frames {
+  std::ptrdiff_t count;
+  const double *q, *v, *a;
+  double *com, *vcom, *acom, *am, *dam, *force, *torque;
+  double* cop;  // on uneven ground, where the outcome is Everything
+  double *feasible_acom, *feasible_dam, *residual;
+  const ContactRows* contacts;
+  double* placements;  // of the contacts' frames in the world: 12 × contacts × frames
+  Outcome* outcomes;
+};
+
+/// What each shared object gives by the function "dynacom_lanes".
+struct Interface {
+  std::size_t size;  // of this struct, Robot, Frames, Joint and Contact, all together
+  int lanes;
+  /// Makes what run() takes; the robot is copied. Null where there is no memory.
+  void* (*create)(const Robot* robot);
+  void (*run)(void* analysis, const Frames* frames);
+  void (*destroy)(void* analysis);
+};
+
+constexpr std::size_t kInterfaceSize = sizeof(Interface) + sizeof(Robot) + sizeof(Frames) +
+                                       sizeof(Joint) + sizeof(Contact) + sizeof(ContactRows);
+constexpr char kEntry[] = "dynacom_lanes";
+using Entry = const Interface* (*)();
+
+}  // namespace dynacom::lanes

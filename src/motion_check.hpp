@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <pinocchio/multibody.hpp>
+#include <vector>
+
+#include "dynacom/motion.hpp"
+
+namespace dynacom::internal {
+
+/// Looks at motions frame by frame, fast, for what Motion::validate() would refuse, and says no
+/// more than that.
+class MotionCheck {
+ public:
+  explicit MotionCheck(const pinocchio::Model& model);
+
+  /// Whether all arrays have the sizes of the model and the time, and time increases.
+  bool hasSizes(const Motion& motion) const;
+  /// Whether a configuration is finite, and its quaternions have norm 1.
+  bool isConfiguration(const Eigen::Ref<const Eigen::VectorXd>& q) const;
+  /// Whether all numbers of a frame are.
+  bool isValid(const Motion& motion, Eigen::Index frame) const;
+
+ private:
+  // Components of a configuration whose squares must add up to one.
+  struct Circle {
+    Eigen::Index first, size;
+  };
+
+  const pinocchio::Model& model_;
+  std::vector<Circle> circles_;
+  bool is_known_ = true;  // whether there are no other conditions
+};
+
+}  // namespace dynacom::internal
