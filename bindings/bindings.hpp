@@ -2,6 +2,7 @@
 #pragma once
 
 #include <eigenpy/eigenpy.hpp>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,8 +26,11 @@ void exposeWrenchDistribution();
 void exposeDynaCoM();
 void exposeMotion();
 void exposeContactSchedule();
+void exposeRecordedMotion();
 void exposeMotionAnalysis();
 void exposeMotionVerdict();
+void exposeMotionStatistics();
+void exposeMotionExamination();
 
 /// The numbers of an array, a list or a tuple; everything else is a TypeError. Not a converter of
 /// Boost.Python's: that would be one for Pinocchio's functions too, and choose among their
@@ -129,6 +133,25 @@ class WithoutLock {
  private:
   PyThreadState* state_;
 };
+
+/// What C++ tells of its progress: a call of what may be called in Python, or nothing for None. It
+/// takes Python's lock; `progress` must outlive it.
+template <class Part>
+std::function<void(Part)> toProgress(const bp::object& progress) {
+  if (progress.is_none()) return nullptr;
+  return [&progress](Part part) {
+    const PyGILState_STATE state = PyGILState_Ensure();
+    bool failed = false;
+    try {
+      progress(part);
+    } catch (const bp::error_already_set&) {
+      failed = true;
+    }
+    PyGILState_Release(state);
+    // The Python error stays set in this thread until Boost.Python raises it again.
+    if (failed) throw bp::error_already_set();
+  };
+}
 
 /// For methods that return a reference: Python gets a copy.
 using Copied = bp::return_value_policy<bp::copy_const_reference>;

@@ -32,7 +32,11 @@ std::string writeContactMotion(const ContactMotion& contact) {
 }
 
 bp::list listContactMotions(const DynaCoM& robot, const Motion& motion, int threads) {
-  return toList(computeContactMotions(robot, motion, threads));
+  const auto compute = [&, own_robot = DynaCoM(robot)] {
+    const WithoutLock without_lock;
+    return computeContactMotions(own_robot, motion, threads);
+  };
+  return toList(compute());
 }
 
 Eigen::VectorXd estimate(const bp::object& contacts, const Eigen::VectorXd& time,

@@ -25,11 +25,16 @@ std::string writeMismatch(const DerivativeMismatch& mismatch) {
 
 bp::object filter(const pinocchio::Model& model, const Eigen::MatrixXd& q, double rate,
                   double cutoff) {
-  return toArray(filterConfigurations(model, q.transpose(), rate, cutoff).transpose());
+  const auto compute = [&] {
+    const WithoutLock without_lock;
+    return filterConfigurations(model, q.transpose(), rate, cutoff);
+  };
+  return toArray(compute().transpose());
 }
 
 Motion differentiateRows(const pinocchio::Model& model, const Eigen::VectorXd& time,
                          const Eigen::MatrixXd& q) {
+  const WithoutLock without_lock;
   return differentiate(model, time, q.transpose());
 }
 

@@ -38,26 +38,14 @@ MotionAnalysis analyze(const DynaCoM& robot, const Motion& motion, const Contact
                        bool flat_horizontal_ground, double omega, const bp::object& progress,
                        int threads, int lanes) {
   AnalysisSettings settings;
-  settings.threads = threads;
-  settings.lanes = lanes;
   settings.flat_horizontal_ground = flat_horizontal_ground;
   settings.omega = omega;
-  if (!progress.is_none())
-    settings.progress = [&progress](Eigen::Index frames) {
-      const PyGILState_STATE state = PyGILState_Ensure();
-      PyObject* result = PyObject_CallFunction(progress.ptr(), "n", Py_ssize_t(frames));
-      const bool failed = result == nullptr;
-      Py_XDECREF(result);
-      PyGILState_Release(state);
-      // The Python error stays set in this thread until Boost.Python raises it again.
-      if (failed) throw bp::error_already_set();
-    };
-  // Copies: without the lock, others may change what they hold.
-  const DynaCoM own_robot(robot);
-  const Motion own_motion(motion);
-  const ContactSchedule own_schedule(schedule);
+  settings.threads = threads;
+  settings.lanes = lanes;
+  settings.progress = toProgress<Eigen::Index>(progress);
+  const DynaCoM own_robot(robot);  // without the lock, others may change it
   const WithoutLock without_lock;
-  return analyzeMotion(own_robot, own_motion, own_schedule, settings);
+  return analyzeMotion(own_robot, motion, schedule, settings);
 }
 
 }  // namespace

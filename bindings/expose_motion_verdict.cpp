@@ -40,8 +40,13 @@ MotionVerdict judge(const DynaCoM& robot, const Motion& motion, const Eigen::Mat
                     const Eigen::VectorXd& quaternion_error, const bp::object& contacts,
                     const Eigen::VectorXd& ground, const MotionAnalysis& analysis,
                     const VerdictSettings& settings, int threads) {
-  return judgeMotion(robot, motion, {recorded_q.transpose(), quaternion_error},
-                     toVectorOf<ContactMotion>(contacts), ground, analysis, settings, threads);
+  const RecordedMotion recorded{motion.time, recorded_q.transpose(), quaternion_error};
+  const auto own_contacts = toVectorOf<ContactMotion>(contacts);
+  const DynaCoM own_robot(robot);  // without the lock, others may change it and the settings
+  const VerdictSettings own_settings(settings);
+  const WithoutLock without_lock;
+  return judgeMotion(own_robot, motion, recorded, own_contacts, ground, analysis, own_settings,
+                     threads);
 }
 
 }  // namespace

@@ -37,6 +37,9 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeDynaCoM();
   exposeMotion();
   exposeContactSchedule();
+  exposeRecordedMotion();
   exposeMotionAnalysis();
   exposeMotionVerdict();
+  exposeMotionStatistics();
+  exposeMotionExamination();
 }

@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
     const dynacom::MotionAnalysis analysis = dynacom::analyzeMotion(talos, motion, schedule);
 
     // And is that enough?
-    const dynacom::RecordedMotion recorded{q, Eigen::VectorXd::Zero(frames)};
+    const dynacom::RecordedMotion recorded{time, q};
     const dynacom::MotionVerdict verdict =
         dynacom::judgeMotion(talos, motion, recorded, contacts, ground, analysis);
     const double largest = analysis.ground_force.row(2).maxCoeff() / (talos.getMass() * 9.81);

@@ -5,10 +5,11 @@
 #include <cmath>
 #include <optional>
 #include <ostream>
-#include <pinocchio/algorithm/kinematics.hpp>
+#include <pinocchio/multibody.hpp>
 
 #include "check.hpp"
-#include "frame_blocks.hpp"
+#include "contact_frame.hpp"
+#include "motion_steps.hpp"
 
 namespace dynacom {
 
@@ -90,17 +91,18 @@ void cutToRest(const Eigen::VectorXd& speed, double rest_speed,
 // hang on.
 class ContactPlacer {
  public:
-  explicit ContactPlacer(const DynaCoM& robot) : model_(robot.getModel()), data_(model_) {
+  explicit ContactPlacer(const DynaCoM& robot) : model_(robot.getModel()) {
     std::vector<bool> carries(static_cast<std::size_t>(model_.njoints), false);
     for (const std::string& name : robot.getKnownContacts()) {
       const auto contact = robot.getContact(name)->clone();
-      const pinocchio::Frame& frame = model_.frames[contact->getFrameID()];
-      contacts_.push_back({contact, &frame, contact->getCorners()});
+      const pinocchio::Frame& frame = internal::getFrame(model_, *contact, name);
+      contacts_.push_back({contact, frame, contact->getCorners()});
       for (auto joint = frame.parentJoint; joint > 0; joint = model_.parents[joint])
         carries[joint] = true;
     }
+    moved_.resize(carries.size());
     for (std::size_t joint = 1; joint < carries.size(); ++joint)
-      if (carries[joint]) joints_.push_back(joint);
+      if (carries[joint]) joints_.push_back({joint, model_.joints[joint].createData()});
   }
 
   void place(const Motion& motion, Eigen::Index frame, std::vector<ContactMotion>& contacts) {
@@ -109,8 +111,8 @@ class ContactPlacer {
     moveJoints();
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
       const auto& [contact, contact_frame, corners] = contacts_[k];
-      const pinocchio::SE3& joint = data_.oMi[contact_frame->parentJoint];
-      contact->setPose(joint * contact_frame->placement);
+      const Moved& joint = moved_[contact_frame.parentJoint];
+      contact->setPose(joint.placement * contact_frame.placement);
       const pinocchio::SE3 surface = contact->getSurfacePose();
       Eigen::Vector3d lowest = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
       for (Eigen::Index corner = 0; corner < corners.cols(); ++corner) {
@@ -118,42 +120,48 @@ class ContactPlacer {
             surface.act(Eigen::Vector3d(corners(0, corner), corners(1, corner), 0.));
         if (point.z() < lowest.z()) lowest = point;
       }
-      // In the joint's axes.
-      const pinocchio::Motion& velocity = data_.v[contact_frame->parentJoint];
+      const Eigen::Vector3d arm = joint.placement.actInv(lowest);
       contacts[k].position.col(frame) = surface.translation();
       contacts[k].rotation.col(frame) = Eigen::Quaterniond(surface.rotation()).coeffs();
       contacts[k].height[frame] = lowest.z();
       contacts[k].velocity.col(frame) =
-          joint.rotation() * (velocity.linear() + velocity.angular().cross(joint.actInv(lowest)));
+          joint.placement.rotation() *
+          (joint.velocity.linear() + joint.velocity.angular().cross(arm));
     }
   }
 
  private:
   struct Placed {
     std::shared_ptr<ContactBase> contact;
-    const pinocchio::Frame* frame;
+    const pinocchio::Frame& frame;
     Eigen::Matrix2Xd corners;
+  };
+  struct Joint {
+    std::size_t index;
+    pinocchio::JointData data;
+  };
+  struct Moved {
+    pinocchio::SE3 placement = pinocchio::SE3::Identity();
+    pinocchio::Motion velocity = pinocchio::Motion::Zero();  // in the joint's axes
   };
 
   // As pinocchio::forwardKinematics(), for the joints that carry contacts.
   void moveJoints() {
-    for (const std::size_t k : joints_) {
-      const std::size_t parent = model_.parents[k];
-      pinocchio::JointData& joint = data_.joints[k];
-      model_.joints[k].calc(joint, q_, v_);
-      const pinocchio::SE3 moved = model_.jointPlacements[k] * joint.M();
-      data_.v[k] = joint.v();
-      data_.oMi[k] = moved;
-      if (parent == 0) continue;
-      data_.v[k] += moved.actInv(data_.v[parent]);
-      data_.oMi[k] = data_.oMi[parent] * moved;
+    for (Joint& joint : joints_) {
+      const Moved& parent = moved_[model_.parents[joint.index]];
+      Moved& moved = moved_[joint.index];
+      model_.joints[joint.index].calc(joint.data, q_, v_);
+      const pinocchio::SE3 step = model_.jointPlacements[joint.index] * joint.data.M();
+      moved.placement = parent.placement * step;
+      moved.velocity = joint.data.v();
+      moved.velocity += step.actInv(parent.velocity);
     }
   }
 
   const pinocchio::Model& model_;
-  pinocchio::Data data_;
   std::vector<Placed> contacts_;
-  std::vector<std::size_t> joints_;
+  std::vector<Joint> joints_;  // that carry contacts
+  std::vector<Moved> moved_;   // by index of all joints, the first of which is the world
   Eigen::VectorXd q_, v_;
 };
 
@@ -170,6 +178,12 @@ void ContactSchedule::validate(Eigen::Index frames) const {
 std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot, const Motion& motion,
                                                  int threads) {
   requireField(threads >= 0, "threads", ">= 0", threads);
+  internal::Workers workers(threads);
+  return internal::computeContactMotions(robot, motion, workers);
+}
+
+std::vector<ContactMotion> internal::computeContactMotions(const DynaCoM& robot,
+                                                           const Motion& motion, Workers& workers) {
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by computeContactMotions before initialize()");
   const pinocchio::Model& model = robot.getModel();
@@ -179,7 +193,7 @@ std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot, const Mot
   for (const std::string& name : robot.getKnownContacts())
     contacts.push_back({name, Eigen::Matrix3Xd(3, frames), Eigen::Matrix4Xd(4, frames),
                         Eigen::VectorXd(frames), Eigen::Matrix3Xd(3, frames)});
-  internal::forEachBlock(frames, threads, [&]() -> internal::BlockWork {
+  forEachBlock(workers, frames, [&]() -> BlockWork {
     const auto placer = std::make_shared<ContactPlacer>(robot);
     return [placer, &motion, &contacts](Eigen::Index first, Eigen::Index size) {
       for (Eigen::Index frame = first; frame < first + size; ++frame)

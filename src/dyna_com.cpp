@@ -8,12 +8,14 @@
 #include <utility>
 
 #include "check.hpp"
+#include "contact_frame.hpp"
 #include "nan.hpp"
 #include "urdf.hpp"
 
 namespace dynacom {
 
 using internal::areFinite;
+using internal::findFrame;
 using internal::kNaN;
 using internal::throwInvalid;
 
@@ -23,18 +25,6 @@ namespace {
 constexpr double kStandardGravity = 9.81;
 // By what part sums of the same masses may differ.
 constexpr double kSameMass = 1e-9;
-
-// The index of a contact's frame. Frames of different types may share a name: that says too little.
-pinocchio::FrameIndex findFrame(const pinocchio::Model& model, const std::string& frame_name,
-                                const std::string& contact_name) {
-  const auto has_name = [&](const pinocchio::Frame& frame) { return frame.name == frame_name; };
-  const auto count = std::count_if(model.frames.begin(), model.frames.end(), has_name);
-  if (count != 1)
-    throwInvalid("contact '", contact_name, "': the model must have one frame '", frame_name,
-                 "', got ", count);
-  const auto frame = std::find_if(model.frames.begin(), model.frames.end(), has_name);
-  return static_cast<pinocchio::FrameIndex>(frame - model.frames.begin());
-}
 
 CentroidalState unknownState(double mass) {
   const Eigen::Vector3d nan = Eigen::Vector3d::Constant(kNaN);

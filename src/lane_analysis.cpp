@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "lane_analysis.hpp"
 
+#include <cmath>
+#include <cstdlib>
 #include <new>
 #include <string>
 #include <typeinfo>
 
+#include "contact_frame.hpp"
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #ifdef DYNACOM_HAS_LANES
@@ -27,13 +30,17 @@ using Vector6 = DynaCoM::Vector6;
 const lanes::Interface* load(const std::string& name) {
   Dl_info library;
   if (!dladdr(reinterpret_cast<const void*>(&load), &library)) return nullptr;
-  const std::string path = library.dli_fname;
-  const std::string folder = path.substr(0, path.rfind('/') + 1);
-  void* object = dlopen((folder + name).c_str(), RTLD_NOW | RTLD_LOCAL);
+  // Not beside a link to it.
+  const std::unique_ptr<char, void (*)(void*)> path(realpath(library.dli_fname, nullptr),
+                                                    std::free);
+  if (!path) return nullptr;
+  const std::string file = path.get();
+  void* object =
+      dlopen((file.substr(0, file.rfind('/') + 1) + name).c_str(), RTLD_NOW | RTLD_LOCAL);
   if (!object) return nullptr;
   const auto entry = reinterpret_cast<lanes::Entry>(dlsym(object, lanes::kEntry));
   const lanes::Interface* interface = entry ? entry() : nullptr;
-  return interface && interface->size == lanes::kInterfaceSize ? interface : nullptr;
+  return interface && interface->version == lanes::kVersion ? interface : nullptr;
 }
 
 bool hasAvx512() {
@@ -45,6 +52,7 @@ bool hasAvx512() {
 bool hasAvx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
 
 const lanes::Interface* findInterface(int at_most) {
+  if (at_most == 1) return nullptr;
   static const lanes::Interface* const avx512 =
       hasAvx512() ? load("libdynacom_avx512.so") : nullptr;
   static const lanes::Interface* const avx2 = hasAvx2() ? load("libdynacom_avx2.so") : nullptr;
@@ -60,6 +68,9 @@ const lanes::Interface* findInterface(int) { return nullptr; }
 #endif
 
 // ---- The robot as plain arrays ----
+
+// By how much the norm of an axis may differ from 1: Pinocchio takes others as they are.
+constexpr double kUnit = 1e-12;
 
 struct JointKind {
   lanes::JointKind kind;
@@ -126,8 +137,8 @@ bool describe(const ContactBase& contact, lanes::Contact& description) {
 
 }  // namespace
 
-std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, bool flat_horizontal_ground,
-                                         int lanes) {
+std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, double ground_height,
+                                         bool flat_horizontal_ground, int lanes) {
   LaneRobot made;
   made.interface_ = findInterface(lanes);
   if (!made.interface_) return std::nullopt;
@@ -139,8 +150,13 @@ std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, bool flat_horizon
   for (std::size_t k = 1; k < static_cast<std::size_t>(model.njoints); ++k) {
     const std::optional<JointKind> kind = recognise(model.joints[k]);
     if (!kind) return std::nullopt;
-    const auto to_axis = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), kind->axis);
-    aligned.emplace_back(to_axis.toRotationMatrix(), Vector3::Zero());
+    if (std::abs(kind->axis.norm() - 1.) > kUnit) return std::nullopt;
+    Matrix3 to_axis = Matrix3::Identity();
+    if (kind->axis != Vector3::UnitZ()) {  // else, also joints of no axis are to stay as they are
+      const Vector3 x = kind->axis.unitOrthogonal();
+      to_axis << x, kind->axis.cross(x), kind->axis;
+    }
+    aligned.emplace_back(to_axis, Vector3::Zero());
     lanes::Joint joint = {};
     joint.kind = kind->kind;
     joint.parent = static_cast<int>(model.parents[k]) - 1;
@@ -148,6 +164,7 @@ std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, bool flat_horizon
     joint.v = model.joints[k].idx_v();
     write(aligned[model.parents[k]].actInv(model.jointPlacements[k]) * aligned[k], joint.placement);
     const pinocchio::Inertia inertia = aligned[k].actInv(model.inertias[k]);
+    joint.massless = inertia.isZero(0.);
     joint.mass = inertia.mass();
     Vector3::Map(joint.com) = inertia.lever();
     const Matrix3 about_com = inertia.inertia().matrix();
@@ -157,7 +174,7 @@ std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, bool flat_horizon
   }
   for (const std::string& name : robot.getKnownContacts()) {
     const ContactBase& contact = *robot.getContact(name);
-    const pinocchio::Frame& frame = model.frames[contact.getFrameID()];
+    const pinocchio::Frame& frame = getFrame(model, contact, name);
     lanes::Contact description = {};
     if (frame.parentJoint == 0 || !describe(contact, description)) return std::nullopt;
     description.parent = static_cast<int>(frame.parentJoint) - 1;
@@ -171,7 +188,7 @@ std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, bool flat_horizon
   made.robot_.contacts = static_cast<int>(made.contacts_.size());
   Vector3::Map(made.robot_.gravity) = robot.getSettings().gravity;
   Vector6::Map(made.robot_.wrench_weights) = robot.getWrenchWeights();
-  made.robot_.ground_height = robot.getGroundHeight();
+  made.robot_.ground_height = ground_height;
   made.robot_.minimal_vertical_force = robot.getMinimalVerticalForce();
   made.robot_.flat_horizontal_ground = flat_horizontal_ground;
   return made;

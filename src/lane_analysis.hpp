@@ -16,9 +16,10 @@ class LaneRobot {
  public:
   /// Nothing, where there is no such object, or where the robot has joints or contacts of other
   /// kinds.
-  /// @param lanes  at most so many frames at once
-  static std::optional<LaneRobot> make(const DynaCoM& robot, bool flat_horizontal_ground,
-                                       int lanes);
+  /// @param ground_height  in place of the robot's [m]
+  /// @param lanes          at most so many frames at once
+  static std::optional<LaneRobot> make(const DynaCoM& robot, double ground_height,
+                                       bool flat_horizontal_ground, int lanes);
 
   int lanes() const { return interface_->lanes; }
 

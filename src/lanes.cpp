@@ -20,6 +20,8 @@ constexpr int kLanes = static_cast<int>(Lanes::size());
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // By how much a quaternion's squared norm may differ from 1: more, and algorithms differ.
 constexpr double kNormalized = 1e-12;
+// From which angle on sine and cosine of stdx overflow [rad].
+constexpr double kLargestAngle = 1e9;
 // What part of the largest pivot the least must be, so that the contacts give all wrenches.
 constexpr double kFullRank = 1e-6;
 // What part of the wrench an answer may lack.
@@ -206,7 +208,7 @@ class Analysis {
   int count_ = 0;
   const double *q_[kLanes], *v_[kLanes], *a_[kLanes];
   Lanes nothing_;    // zero, if all numbers are finite
-  Mask normalized_;  // all quaternions
+  Mask normalized_;  // all quaternions, and no angle is huge
   // Sums over the bodies, about the first joint: mass times place, velocity, acceleration; angular
   // momentum and its rate.
   Vector centre_, places_, momentum_, momentum_rate_, angular_momentum_, angular_momentum_rate_;
@@ -245,6 +247,7 @@ Moving Analysis::move(const Joint& joint) {
       Lanes cosine, sine;
       if (joint.kind == JointKind::Revolute) {
         const Lanes angle = load(q_, joint.q);
+        normalized_ = normalized_ && stdx::abs(angle) < kLargestAngle;
         cosine = stdx::cos(angle);
         sine = stdx::sin(angle);
       } else {
@@ -328,7 +331,7 @@ Moving Analysis::move(const Joint& joint) {
 }
 
 void Analysis::addBody(const Joint& joint, const Moving& moving) {
-  if (joint.mass == 0.) return;
+  if (joint.massless) return;
   const Vector arm = moving.rotation * broadcast(joint.com);
   const Vector around = cross(moving.angular_velocity, arm);
   const Lanes mass = joint.mass;
@@ -600,7 +603,7 @@ void run(void* analysis, const Frames* frames) { static_cast<Analysis*>(analysis
 
 void destroy(void* analysis) { delete static_cast<Analysis*>(analysis); }
 
-constexpr Interface kInterface = {kInterfaceSize, kLanes, &create, &run, &destroy};
+constexpr Interface kInterface = {kVersion, kLanes, &create, &run, &destroy};
 
 }  // namespace
 }  // namespace dynacom::lanes

@@ -28,6 +28,7 @@ struct Joint {
   int parent;            // index of another joint before it, −1 for the world
   int q, v;              // its first components in configuration and velocity
   double placement[12];  // in the parent joint's frame
+  bool massless;         // without inertia, too
   double mass;
   double com[3];      // in the joint's frame
   double inertia[6];  // about the CoM, in the joint's axes: xx, xy, yy, xz, yz, zz
@@ -58,7 +59,7 @@ struct Robot {
 enum class Outcome : unsigned char {
   Everything,  // no inequality is active
   Dynamics,    // all but distribution and contacts
-  Nothing,     // numbers are not finite, or quaternions have another norm than 1
+  Nothing,     // numbers are not finite, quaternions not of norm 1, or angles huge
 };
 
 /// Where results of a contact go; see MotionAnalysis::Contact. Written where it is active and the
@@ -68,12 +69,13 @@ struct ContactRows {
   double *wrench, *vertical_force, *cop, *friction_usage, *yaw_usage, *cop_margin;
 };
 
-/// Where frames are, one behind the other, and where results go; see MotionAnalysis.
+/// Where frames are, one behind the other, and where results go; see MotionAnalysis. What the
+/// outcome says is not there may have been written all the same.
 struct Frames {
   std::ptrdiff_t count;
   const double *q, *v, *a;
   double *com, *vcom, *acom, *am, *dam, *force, *torque;
-  double* cop;  // on uneven ground, where the outcome is Everything
+  double* cop;
   double *feasible_acom, *feasible_dam, *residual;
   const ContactRows* contacts;
   double* placements;  // of the contacts' frames in the world: 12 × contacts × frames
@@ -82,7 +84,7 @@ struct Frames {
 
 /// What each shared object gives by the function "dynacom_lanes".
 struct Interface {
-  std::size_t size;  // of this struct, Robot, Frames, Joint and Contact, all together
+  int version;  // of what stands here
   int lanes;
   /// Makes what run() takes; the robot is copied. Null where there is no memory.
   void* (*create)(const Robot* robot);
@@ -90,8 +92,7 @@ struct Interface {
   void (*destroy)(void* analysis);
 };
 
-constexpr std::size_t kInterfaceSize = sizeof(Interface) + sizeof(Robot) + sizeof(Frames) +
-                                       sizeof(Joint) + sizeof(Contact) + sizeof(ContactRows);
+constexpr int kVersion = 1;  // grows with each change to this file
 constexpr char kEntry[] = "dynacom_lanes";
 using Entry = const Interface* (*)();
 

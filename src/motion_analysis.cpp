@@ -5,14 +5,19 @@
 #include <optional>
 
 #include "check.hpp"
-#include "frame_blocks.hpp"
+#include "contact_frame.hpp"
 #include "lane_analysis.hpp"
 #include "motion_check.hpp"
+#include "motion_steps.hpp"
 #include "nan.hpp"
 
 namespace dynacom {
 
+using internal::Desks;
 using internal::kNaN;
+using internal::LaneAnalysis;
+using internal::LaneRobot;
+using internal::MotionCheck;
 
 namespace {
 
@@ -62,13 +67,14 @@ MotionAnalysis makeStorage(const std::vector<std::string>& names, const Motion& 
 // What a thread does with blocks of frames.
 class Analyst {
  public:
-  Analyst(const DynaCoM& robot, const internal::LaneRobot* lane_robot, const Motion& motion,
+  Analyst(Desks& desks, double ground_height, const LaneRobot* lane_robot, const Motion& motion,
           const ContactSchedule& schedule, const AnalysisSettings& settings, MotionAnalysis& result)
-      : robot_(robot),
+      : desks_(desks),
+        ground_height_(ground_height),
         motion_(motion),
         schedule_(schedule),
         flat_(settings.flat_horizontal_ground),
-        check_(robot.getModel()),
+        check_(desks.robot().getModel()),
         result_(result) {
     if (lane_robot) lanes_.emplace(*lane_robot);
   }
@@ -101,15 +107,16 @@ class Analyst {
   void computeDynamics(Eigen::Index frame);
   void finish(Eigen::Index frame);
 
-  const DynaCoM& robot_;
+  Desks& desks_;
+  const double ground_height_;
   const Motion& motion_;
   const ContactSchedule& schedule_;
   const bool flat_;
-  const internal::MotionCheck check_;
+  const MotionCheck check_;
   MotionAnalysis& result_;
-  std::optional<internal::LaneAnalysis> lanes_;
+  std::optional<LaneAnalysis> lanes_;
   // For what the lanes leave, as soon as there is any: a robot, and its contacts.
-  std::optional<DynaCoM> worker_;
+  std::shared_ptr<DynaCoM> worker_;
   std::vector<std::shared_ptr<const ContactBase>> contacts_;
   bool is_cold_ = true;  // whether the worker has done nothing in this block
 };
@@ -131,16 +138,13 @@ void Analyst::writeDefaults(Eigen::Index first, Eigen::Index frames) {
 // The robot with the contacts of a frame.
 DynaCoM& Analyst::prepare(Eigen::Index frame) {
   if (!worker_) {
-    worker_.emplace(robot_);
-    for (const MotionAnalysis::Contact& contact : result_.contacts) {
-      worker_->resetContactPose(contact.name);
-      worker_->deactivateContact(contact.name);
+    worker_ = desks_.take();
+    worker_->setGroundHeight(ground_height_);
+    for (const MotionAnalysis::Contact& contact : result_.contacts)
       contacts_.push_back(worker_->getContact(contact.name));
-    }
   }
   if (is_cold_) {
-    for (const std::string& name : schedule_.names) worker_->deactivateContact(name);
-    worker_->forgetDistributions();
+    Desks::clear(*worker_);
     is_cold_ = false;
   }
   for (std::size_t k = 0; k < schedule_.names.size(); ++k) {
@@ -166,7 +170,8 @@ void Analyst::takeDynamics(Eigen::Index k, Eigen::Index frame) {
   data.dhg.angular() = result_.dam.col(frame);
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     if (!result_.contacts[i].active[frame]) continue;
-    const pinocchio::Frame& contact_frame = model.frames[contacts_[i]->getFrameID()];
+    const pinocchio::Frame& contact_frame =
+        internal::getFrame(model, *contacts_[i], result_.contacts[i].name);
     data.oMi[contact_frame.parentJoint] =
         lanes_->placement(i, k) * contact_frame.placement.inverse();
   }
@@ -215,12 +220,11 @@ void Analyst::finish(Eigen::Index frame) {
 
 // Virtual repellent point (7), non-linearity (8) and divergent component of motion (20) of the
 // motion whose centre of pressure is reported, as DynaCoM::computeNL().
-void addPoints(MotionAnalysis& result, bool flat_horizontal_ground, Eigen::Index first,
-               Eigen::Index frames) {
+void addPoints(MotionAnalysis& result, bool flat_horizontal_ground) {
   const Eigen::Matrix3Xd& acceleration =
       flat_horizontal_ground ? result.acom : result.feasible_acom;
   CentroidalState state;
-  for (Eigen::Index frame = first; frame < first + frames; ++frame) {
+  for (Eigen::Index frame = 0; frame < result.com.cols(); ++frame) {
     state.com = result.com.col(frame);
     state.vcom = result.vcom.col(frame);
     state.acom = acceleration.col(frame);
@@ -242,31 +246,43 @@ void AnalysisSettings::validate() const {
 int countLanes(const DynaCoM& robot, int lanes) {
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by countLanes before initialize()");
-  const auto lane_robot = internal::LaneRobot::make(robot, true, lanes);
+  internal::requireField(lanes >= 1, "lanes", ">= 1", lanes);
+  const auto lane_robot = LaneRobot::make(robot, robot.getGroundHeight(), true, lanes);
   return lane_robot ? lane_robot->lanes() : 1;
 }
 
 MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
                              const ContactSchedule& schedule, const AnalysisSettings& settings) {
+  settings.validate();
+  Desks desks(robot);
+  internal::Workers workers(settings.threads);
+  return internal::analyzeMotion(desks, robot.getGroundHeight(), motion, schedule, settings,
+                                 workers);
+}
+
+MotionAnalysis internal::analyzeMotion(Desks& desks, double ground_height, const Motion& motion,
+                                       const ContactSchedule& schedule,
+                                       const AnalysisSettings& settings, Workers& workers) {
+  const DynaCoM& robot = desks.robot();
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by analyzeMotion before initialize()");
-  const internal::MotionCheck check(robot.getModel());
+  const MotionCheck check(robot.getModel());
   if (!check.hasSizes(motion)) motion.validate(robot.getModel());
   schedule.validate(motion.frames());
-  settings.validate();
 
   for (const std::string& name : schedule.names) robot.getContact(name);
   const std::vector<std::string> names = robot.getKnownContacts();
   MotionAnalysis result = makeStorage(names, motion, schedule);
   const auto lane_robot =
-      internal::LaneRobot::make(robot, settings.flat_horizontal_ground, settings.lanes);
-  const auto makeWork = [&]() -> internal::BlockWork {
-    const auto analyst = std::make_shared<Analyst>(robot, lane_robot ? &*lane_robot : nullptr,
-                                                   motion, schedule, settings, result);
+      LaneRobot::make(robot, ground_height, settings.flat_horizontal_ground, settings.lanes);
+  const auto makeWork = [&]() -> BlockWork {
+    const auto analyst =
+        std::make_shared<Analyst>(desks, ground_height, lane_robot ? &*lane_robot : nullptr, motion,
+                                  schedule, settings, result);
     return [analyst](Eigen::Index first, Eigen::Index frames) { analyst->analyze(first, frames); };
   };
   try {
-    internal::forEachBlock(motion.frames(), settings.threads, makeWork, settings.progress);
+    forEachBlock(workers, motion.frames(), makeWork, settings.progress);
   } catch (const InvalidFrame&) {
     motion.validate(robot.getModel());
     throw;
@@ -274,14 +290,8 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
 
   result.omega = settings.omega;
   if (result.omega == 0.)
-    result.omega =
-        computeOmega(result.com, -robot.getSettings().gravity.z(), robot.getGroundHeight());
-  if (std::isnan(result.omega)) return result;
-  internal::forEachBlock(motion.frames(), settings.threads, [&]() -> internal::BlockWork {
-    return [&](Eigen::Index first, Eigen::Index frames) {
-      addPoints(result, settings.flat_horizontal_ground, first, frames);
-    };
-  });
+    result.omega = computeOmega(result.com, -robot.getSettings().gravity.z(), ground_height);
+  if (!std::isnan(result.omega)) addPoints(result, settings.flat_horizontal_ground);
   return result;
 }
 

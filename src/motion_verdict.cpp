@@ -9,7 +9,7 @@
 #include <pinocchio/algorithm/kinematics.hpp>
 
 #include "check.hpp"
-#include "frame_blocks.hpp"
+#include "motion_steps.hpp"
 
 namespace dynacom {
 
@@ -80,34 +80,30 @@ Eigen::VectorXd measureJumps(const pinocchio::Model& model, const Eigen::MatrixX
 // Distributes with other contacts than the analysis did.
 class SecondLook {
  public:
-  explicit SecondLook(const DynaCoM& robot) : robot_(robot), names_(robot_.getKnownContacts()) {
-    for (const std::string& name : names_) robot_.resetContactPose(name);
-  }
+  SecondLook(internal::Desks& desks, const std::vector<std::string>& names)
+      : robot_(desks.take()), names_(names) {}
 
   // Begins a block of frames, which does not depend on others.
-  void begin() {
-    for (const std::string& name : names_) robot_.deactivateContact(name);
-    robot_.forgetDistributions();
-  }
+  void begin() { internal::Desks::clear(*robot_); }
 
   // What is missing with these contacts.
   Vector6 findResidual(const Motion& motion, const MotionAnalysis& analysis, Eigen::Index frame,
                        const Eigen::Array<bool, Eigen::Dynamic, 1>& active) {
-    pinocchio::forwardKinematics(robot_.getModel(), robot_.getData(), motion.q.col(frame));
+    pinocchio::forwardKinematics(robot_->getModel(), robot_->getData(), motion.q.col(frame));
     for (std::size_t k = 0; k < names_.size(); ++k) {
       if (active[static_cast<Eigen::Index>(k)])
-        robot_.activateContact(names_[k]);
+        robot_->activateContact(names_[k]);
       else
-        robot_.deactivateContact(names_[k]);
+        robot_->deactivateContact(names_[k]);
     }
-    robot_.distributeForce(analysis.ground_force.col(frame), analysis.ground_torque.col(frame),
-                           analysis.com.col(frame));
-    return robot_.getDistribution().residual;
+    robot_->distributeForce(analysis.ground_force.col(frame), analysis.ground_torque.col(frame),
+                            analysis.com.col(frame));
+    return robot_->getDistribution().residual;
   }
 
  private:
-  DynaCoM robot_;
-  const std::vector<std::string> names_;  // in the robot's order, which activating changes
+  const std::shared_ptr<DynaCoM> robot_;
+  const std::vector<std::string>& names_;  // in the order of results
 };
 
 MotionFinding sumUp(Eigen::VectorXd measured, const FaultLimit& limit,
@@ -198,6 +194,18 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
                           const MotionAnalysis& analysis, const VerdictSettings& settings,
                           int threads) {
   requireField(threads >= 0, "threads", ">= 0", threads);
+  internal::Desks desks(robot);
+  internal::Workers workers(threads);
+  return internal::judgeMotion(desks, motion, recorded, contacts, ground, analysis, settings,
+                               workers);
+}
+
+MotionVerdict internal::judgeMotion(Desks& desks, const Motion& motion,
+                                    const RecordedMotion& recorded,
+                                    const std::vector<ContactMotion>& contacts,
+                                    const Eigen::VectorXd& ground, const MotionAnalysis& analysis,
+                                    const VerdictSettings& settings, Workers& workers) {
+  const DynaCoM& robot = desks.robot();
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by judgeMotion before initialize()");
   settings.validate();
@@ -207,9 +215,13 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
   internal::requireSize("recorded.q", recorded.q.cols(), frames, "frames");
   internal::requireSize("recorded.q", recorded.q.rows(), Eigen::Index(robot.getModel().nq),
                         "components (nq)");
-  internal::requireSize("recorded.quaternion_error", recorded.quaternion_error.size(), frames,
-                        "frames");
-  internal::requireSize("analysis", Eigen::Index(analysis.status.size()), frames, "frames");
+  if (recorded.quaternion_error.size() != 0)
+    internal::requireSize("recorded.quaternion_error", recorded.quaternion_error.size(), frames,
+                          "frames");
+  for (const Eigen::Matrix3Xd* values :
+       {&analysis.ground_force, &analysis.ground_torque, &analysis.com})
+    internal::requireSize("analysis", values->cols(), frames, "frames");
+  internal::requireSize("analysis", analysis.residual.cols(), frames, "frames");
   internal::requireSize("ground", ground.size(), count, "heights (one per contact)");
   const std::vector<std::string> names = robot.getKnownContacts();
   internal::requireSize("contacts", contacts.size(), names.size(), "contacts of the robot");
@@ -258,13 +270,13 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
       measure(MotionFault::ResidualTorque)[frame] = residual.torque;
     }
   };
-  internal::forEachBlock(frames, threads, [&]() -> internal::BlockWork {
+  forEachBlock(workers, frames, [&]() -> BlockWork {
     return [&, second_look = std::shared_ptr<SecondLook>()](Eigen::Index first,
                                                             Eigen::Index size) mutable {
       if (second_look) second_look->begin();
       const auto lookAgain = [&](Eigen::Index frame, const auto& active) {
         if (!second_look) {
-          second_look = std::make_shared<SecondLook>(robot);
+          second_look = std::make_shared<SecondLook>(desks, names);
           second_look->begin();
         }
         return second_look->findResidual(motion, analysis, frame, active);
@@ -273,7 +285,8 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
     };
   });
   measure(MotionFault::Discontinuity) = measureJumps(robot.getModel(), recorded.q);
-  measure(MotionFault::Quaternion) = recorded.quaternion_error;
+  if (recorded.quaternion_error.size() != 0)
+    measure(MotionFault::Quaternion) = recorded.quaternion_error;
 
   MotionVerdict verdict;
   for (std::size_t k = 0; k < kMotionFaults; ++k)

@@ -243,7 +243,7 @@ BOOST_AUTO_TEST_CASE(contacts_and_verdicts_are_the_same_whatever_the_number_of_t
       append(numbers, contact.height);
       append(numbers, contact.velocity);
     }
-    const RecordedMotion recorded{motion.q, VectorXd::Zero(frames)};
+    const RecordedMotion recorded{motion.time, motion.q};
     const MotionVerdict verdict =
         judgeMotion(robot, motion, recorded, contacts, VectorXd::Zero(4), analysis, {}, threads);
     for (const MotionFinding& finding : verdict.findings) append(numbers, finding.measured);

@@ -18,6 +18,8 @@ struct DYNACOM_EXPORT AnalysisSettings {
   /// ω of the virtual repellent point and the divergent component of motion [rad/s]. 0 stands for
   /// √(g / mean height of the CoM above the ground).
   double omega = 0.;
+  /// Called now and then, in the caller's thread, with the number of frames done, which increases.
+  std::function<void(Eigen::Index)> progress;
   /// How many threads do the work, at most; 0 stands for as many as the machine has. Blocks of 256
   /// frames, each of which starts cold, are what a thread takes: results are the same, bit for bit,
   /// whatever the number of threads.
@@ -25,8 +27,6 @@ struct DYNACOM_EXPORT AnalysisSettings {
   /// How many frames a thread computes at once, at most, in the lanes of SIMD registers; see
   /// countLanes(). 1 stands for none of that. Results are the same but for rounding.
   int lanes = kMaximalLanes;
-  /// Called now and then, in the caller's thread, with the number of frames done, which increases.
-  std::function<void(Eigen::Index)> progress;
 
   static constexpr int kMaximalLanes = 8;
 
@@ -35,8 +35,10 @@ struct DYNACOM_EXPORT AnalysisSettings {
 };
 
 /// How many lanes this machine has for a robot, and no more than so many: 8 with AVX-512, 4 with
-/// AVX2, and 1 where there is neither, or the robot has joints or contacts that lanes do not know.
-/// @throws NotReadyError before the robot's initialize()
+/// AVX2, and 1 where there is neither, or where the robot has what lanes do not know: other joints
+/// than those of URDFs, other contacts than ContactPoint and Contact6D, or one that is fixed to the
+/// world.
+/// @throws std::invalid_argument unless lanes >= 1; NotReadyError before the robot's initialize()
 DYNACOM_EXPORT int countLanes(const DynaCoM& robot, int lanes = AnalysisSettings::kMaximalLanes);
 
 /// What analyzeMotion() found: one column per frame, in the world's axes, SI units.

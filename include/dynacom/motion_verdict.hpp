@@ -7,6 +7,7 @@
 #include <string>
 
 #include "dynacom/motion_analysis.hpp"
+#include "dynacom/recorded_motion.hpp"
 
 namespace dynacom {
 
@@ -95,15 +96,10 @@ struct DYNACOM_EXPORT MotionVerdict {
   bool isFeasible() const;
 };
 
-/// A motion as it was recorded, before any filter.
-struct RecordedMotion {
-  Eigen::MatrixXd q;                 ///< configurations with quaternions of norm 1, nq × frames
-  Eigen::VectorXd quaternion_error;  ///< | norm − 1 | of the root's before that; frames
-};
-
 /// Judges a motion.
 /// @param contacts  of computeContactMotions() for the same robot and motion
 /// @param ground    height of the ground under each contact, see estimateGround() [m]
+/// @param recorded  the same before any filter, of which q and quaternion_error are looked at
 /// @param analysis  of analyzeMotion() for the same robot and motion
 /// @param threads   as AnalysisSettings::threads
 /// @throws std::invalid_argument if settings or motion are not valid, or sizes differ;

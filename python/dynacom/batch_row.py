@@ -22,7 +22,7 @@ from dynacom.errors import DynacomError
 from dynacom.motion_clip import Options
 from dynacom.motion_file import Clip, read_motion
 from dynacom.motion_pickle import read_clips
-from dynacom.motion_report import FAULTS, MotionReport, analyze
+from dynacom.motion_report import FAULTS, MotionReport, examine, make_examiner
 from dynacom.robots import Robot
 
 if TYPE_CHECKING:
@@ -185,6 +185,8 @@ class Judge:
     def __init__(self, job: Job) -> None:
         self._job = job
         self._reading = Options(job.fps, job.quat, job.trust)
+        # One thread: there are other processes.
+        self._examiner = make_examiner(job.robot, job.options, sensitivity=False, threads=1)
 
     def __call__(self, name: str, file: str, known: str | None) -> list[Row] | None:
         """The rows of a file: one per clip in it, whatever it holds.
@@ -239,7 +241,7 @@ class Judge:
         frames = None if job.frames is None else _frames_file(job.frames, job.robot, name, clip)
         try:
             with np.errstate(all="ignore"):
-                report = analyze(read(), job.robot, options=job.options, sensitivity=False)
+                report = examine(read(), job.robot, job.options, self._examiner)
             row = _report_row(report, name)
         except Exception as error:
             if frames is not None:

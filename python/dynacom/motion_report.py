@@ -2,9 +2,9 @@
 """What a motion asks of the ground, frame by frame and as a whole."""
 
 import json
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,21 +12,17 @@ import numpy as np
 
 from dynacom.analysis_options import AnalysisOptions
 from dynacom.dynacom_pywrap import (
-    ContactMotion,
     ContactSchedule,
-    DynaCoM,
+    CutoffSensitivity,
+    DerivedMotion,
+    DistributionStatus,
     Motion,
     MotionAnalysis,
+    MotionExamination,
+    MotionExaminer,
     MotionVerdict,
-    analyzeMotion,
-    compareDerivatives,
-    computeContactMotions,
-    detectContacts,
-    differentiate,
-    estimateGround,
-    filterConfigurations,
-    judgeMotion,
-    kMaximalCutoff,
+    RecordedMotion,
+    compareMeasured,
 )
 from dynacom.errors import DynacomError
 from dynacom.motion_file import Clip, read_motion
@@ -78,16 +74,17 @@ _CONTACT_COLUMNS = (
     ("height", ("",), "m"),
     ("speed", ("",), "m/s"),
 )
+# Of a contact in the summary: fields of ContactStatistics.
+_CONTACT_STATISTICS = (
+    "active_share",
+    "weight_share",
+    "weight_share_while_active",
+    "largest_vertical_force",
+    "largest_friction_usage",
+    "least_cop_margin",
+)
 # Where the file says what the contacts felt.
 _MEASURED_COLUMNS = (("measured_force", _XYZ, "N"), ("measured_torque", _XYZ, "N m"))
-
-# How far derivatives from a file may be off, as parts of them, to be used: integrators differ by
-# more than rounding, and a landing is a step in velocity.
-_VELOCITY_MISMATCH = 0.05
-_ACCELERATION_MISMATCH = 0.2
-# How far a frame may be from where an even frame rate puts it, in frames, to be taken for there:
-# times are often rounded to milliseconds.
-_EVEN = 0.1
 
 # From which height on a ground is worth a question: most files have theirs at zero [m].
 _FAR_FROM_ZERO = 0.1
@@ -105,7 +102,7 @@ FAULTS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MotionReport:
     """What was found of a motion.
 
@@ -115,15 +112,40 @@ class MotionReport:
     clip: Clip
     robot: Robot
     options: AnalysisOptions
-    #: As analysed: filtered, where derivatives had to be computed.
-    motion: Motion = field(repr=False)
-    schedule: ContactSchedule = field(repr=False)
-    analysis: MotionAnalysis = field(repr=False)
-    verdict: MotionVerdict
-    #: By name, see docs/columns.md: ``com`` (T, 3), ``contact.left_sole.force`` (T, 3), ...
-    arrays: dict[str, np.ndarray] = field(repr=False)
-    #: What summary.json holds: docs/verdict.md.
-    summary: dict[str, Any] = field(repr=False)
+    #: Step by step.
+    examination: MotionExamination = field(repr=False)
+    #: How it is known when contacts are active.
+    _schedule_text: str = field(repr=False)
+
+    @property
+    def motion(self) -> Motion:
+        """As analysed: filtered, where derivatives had to be computed."""
+        return self.examination.derived.motion
+
+    @property
+    def schedule(self) -> ContactSchedule:
+        """Which contacts are active when."""
+        return self.examination.schedule
+
+    @property
+    def analysis(self) -> MotionAnalysis:
+        """Dynamics and forces."""
+        return self.examination.analysis
+
+    @property
+    def verdict(self) -> MotionVerdict:
+        """Whether the motion is feasible, and what speaks against it."""
+        return self.examination.verdict
+
+    @cached_property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """By name, see docs/columns.md: ``com`` (T, 3), ``contact.left_sole.force`` (T, 3), ..."""
+        return _collect_arrays(self.clip, self.examination)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """What summary.json holds: docs/verdict.md."""
+        return _without_nan(_summarize(self))
 
     def __getitem__(self, name: str) -> np.ndarray:
         """An array by its name."""
@@ -240,6 +262,7 @@ def analyze(
     schedule: str | Path | ContactSchedule | None = None,
     options: AnalysisOptions | None = None,
     sensitivity: bool = True,
+    threads: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> MotionReport:
     """Judges a motion: what the ground must give, what its contacts can, and whether that suffices.
@@ -256,6 +279,8 @@ def analyze(
         options: settings; their defaults by default.
         sensitivity: whether to judge the motion with half and twice the cut-off, too, which takes
             three times as long.
+        threads: how many do the work; 0 stands for as many as the machine has. Results do not
+            depend on it.
         progress: called now and then with what part of the work is done.
 
     Raises:
@@ -270,216 +295,141 @@ def analyze(
         robot = load_robot(robot)
     if not isinstance(motion, Clip):
         motion = read_motion(motion, robot, fps=fps, quat=quat, trust=trust, clip=clip)
-    try:
-        report = progress or (lambda part: None)
-        return _analyze(motion, robot, schedule, options, sensitivity, report)
-    except ValueError as error:
-        raise DynacomError(f"{motion.path}: {error}") from error
+    examiner = make_examiner(
+        robot, options, sensitivity=sensitivity, threads=threads, progress=progress
+    )
+    return examine(motion, robot, options, examiner, schedule)
 
 
-@dataclass(frozen=True)
-class _Derived:
-    """A motion with derivatives, and where these come from."""
+def make_examiner(
+    robot: Robot, options: AnalysisOptions, *, sensitivity: bool, **others: Any
+) -> MotionExaminer:
+    """What examines motions of a robot; `others` are arguments of :class:`MotionExaminer`."""
+    return MotionExaminer(
+        robot.dynacom(),
+        options.cutoff or 0.0,
+        options.flat,
+        options.omega,
+        options.detection,
+        options.verdict,
+        sensitivity,
+        **others,
+    )
 
-    motion: Motion
-    #: Of the filter [Hz]; None where there was none.
-    cutoff: float | None
-    text: str
 
-
-def _analyze(
+def examine(
     clip: Clip,
     robot: Robot,
-    schedule: str | Path | ContactSchedule | None,
     options: AnalysisOptions,
-    sensitive: bool,
-    progress: Callable[[float], None],
+    examiner: MotionExaminer,
+    schedule: str | Path | ContactSchedule | None = None,
 ) -> MotionReport:
-    derived = _derive(clip, robot, options.cutoff)
-    dynamics = robot.dynacom()
-    contacts = computeContactMotions(dynamics, derived.motion)
-    ground = estimateGround(contacts, clip.time, options.detection)
-    schedule, schedule_text = _find_schedule(clip, schedule, contacts, ground, options)
-    dynamics.setGroundHeight(float(ground.mean()))
+    """As :func:`analyze`, by an examiner that was made for robot and options.
 
-    # The motion itself, and with other cut-offs how much hangs on that.
-    others = _other_cutoffs(clip, derived.cutoff) if sensitive else []
-    work = (1 + len(others)) * len(clip.time)
-
-    def judge(motion: Motion, done: int) -> tuple[MotionAnalysis, MotionVerdict]:
-        analysis = analyzeMotion(
-            dynamics,
-            motion,
-            schedule,
-            options.flat,
-            omega=options.omega,
-            progress=lambda frames: progress((done + frames) / work),
-        )
-        moved = contacts if motion is derived.motion else computeContactMotions(dynamics, motion)
-        verdict = judgeMotion(
-            dynamics,
-            motion,
-            clip.q,
-            clip.quaternion_error,
-            moved,
-            ground,
-            analysis,
-            options.verdict,
-        )
-        return analysis, verdict
-
-    analysis, verdict = judge(derived.motion, 0)
-    weight = _weight(dynamics)
-    sensitivity = []
-    if derived.cutoff is not None:
-        sensitivity.append(_residuals(derived.cutoff, analysis, verdict, weight))
-        for number, cutoff in enumerate(others):
-            other = _recompute(clip, robot, cutoff)
-            results = judge(other, (1 + number) * len(clip.time))
-            sensitivity.append(_residuals(cutoff, *results, weight))
-        sensitivity.sort(key=lambda entry: entry["cutoff"])
-
-    arrays = _collect_arrays(clip, analysis, contacts, ground)
-    unexplained = _unexplained(clip, analysis, verdict)
-    rms_force, rms_torque = _residual_rms(analysis, weight)
-    notes = [
-        *clip.notes,
-        derived.text,
-        schedule_text,
-        _ground_text(robot, ground, options.detection.same_ground),
-    ]
-    if unexplained["share"] > 0.0:
-        notes.append(_unexplained_text(unexplained))
-    summary = {
-        "clip": clip.path.name,
-        "robot": robot.name,
-        "mass": dynamics.getMass(),
-        "frames": len(clip.time),
-        "duration": float(clip.time[-1] - clip.time[0]),
-        "frame_rate": _frame_rate(clip.time),
-        "omega": analysis.omega,
-        "verdict": "feasible" if verdict.feasible else "not feasible",
-        "codes": _codes(verdict),
-        "reasons": _reasons(verdict, options, len(clip.time)),
-        "statuses": dict(Counter(status.name for status in analysis.status)),
-        "residual_force_rms": rms_force,
-        "residual_torque_rms": rms_torque,
-        "notes": notes,
-        "derivatives": derived.text,
-        "cutoff": derived.cutoff,
-        "cutoff_sensitivity": sensitivity,
-        "ground": dict(zip(robot.contacts, ground.tolist(), strict=True)),
-        "contacts": {c.name: _summarize_contact(c, weight) for c in analysis.contacts},
-        "mean_vertical_force": float(analysis.ground_force[:, 2].mean() / weight),
-        "momentum_change": float(_momentum_change(analysis, dynamics.getMass()) / weight),
-        "unexplained": unexplained,
-        "measured": _compare_forces(clip, analysis),
-        "options": options.to_dict(),
-    }
-    return MotionReport(
-        clip,
-        robot,
-        options,
-        derived.motion,
-        schedule,
-        analysis,
-        verdict,
-        arrays,
-        _without_nan(summary),
-    )
-
-
-# Derivatives.
-
-
-def _even_times(time: np.ndarray) -> np.ndarray | None:
-    """The times of an even frame rate, where these are that but for rounding."""
-    if len(time) < 2:
-        return None
-    even, step = np.linspace(time[0], time[-1], len(time), retstep=True)
-    return even if np.ptp(time - even) <= 2.0 * _EVEN * step else None
-
-
-def _frame_rate(time: np.ndarray) -> float | None:
-    """Frames per second, where they are evenly spaced [Hz]."""
-    if _even_times(time) is None:
-        return None
-    return float((len(time) - 1) / (time[-1] - time[0]))
-
-
-def _recompute(clip: Clip, robot: Robot, cutoff: float | None) -> Motion:
-    q, rate = clip.q, _frame_rate(clip.time)
-    if cutoff is not None:
-        q = filterConfigurations(robot.model, q, rate, cutoff)
-    time = clip.time if rate is None else _even_times(clip.time)
-    motion = differentiate(robot.model, time, q)
-    return Motion(clip.time, motion.q, motion.v, motion.a)
-
-
-def _derive(clip: Clip, robot: Robot, cutoff: float | None) -> _Derived:
-    reason = "the file has none"
-    if clip.v is not None and clip.a is not None:
-        motion = Motion(clip.time, clip.q, clip.v, clip.a)
-        mismatch = compareDerivatives(robot.model, motion)
-        fits = f"{mismatch.velocity:.1%} and {mismatch.acceleration:.1%}"
-        agree = mismatch.velocity <= _VELOCITY_MISMATCH
-        if agree and mismatch.acceleration <= _ACCELERATION_MISMATCH:
-            text = f"Velocities and accelerations are the file's: they differ by {fits} from its"
-            return _Derived(motion, None, f"{text} positions and velocities.")
-        reason = f"the file's differ by {fits} from its positions and velocities"
-    elif clip.v is not None:
-        reason = "the file has velocities only"
-    rate = _frame_rate(clip.time)
-    if cutoff is not None and rate is None and len(clip.time) > 1:
-        raise DynacomError(
-            f"{clip.path}: times must be evenly spaced to be filtered, got steps from "
-            f"{np.diff(clip.time).min():g} to {np.diff(clip.time).max():g} s; without a filter "
-            "(--cutoff 0) they need not be"
-        )
-    if rate is None:
-        cutoff = None
-    elif cutoff is not None and not 0.0 < cutoff < kMaximalCutoff * rate:
-        raise DynacomError(
-            f"{clip.path}: cutoff must be > 0 and < {kMaximalCutoff * rate:g} Hz, which is "
-            f"{kMaximalCutoff:g} of the frame rate, got {cutoff:g} Hz"
-        )
-    how = (
-        "without a filter"
-        if cutoff is None
-        else f"after a Butterworth filter of 4th order, forward and backward, at {cutoff:g} Hz"
-    )
-    if rate is not None and (error := np.abs(clip.time - _even_times(clip.time)).max()) > 1e-6:
-        how += f", with times made even, by up to {1e3 * error:.2g} ms"
-    text = f"Velocities and accelerations are computed from the positions, {how}: {reason}."
-    return _Derived(_recompute(clip, robot, cutoff), cutoff, text)
-
-
-def _other_cutoffs(clip: Clip, cutoff: float | None) -> list[float]:
-    if cutoff is None:
-        return []
-    limit = kMaximalCutoff * _frame_rate(clip.time)
-    return [other for other in (0.5 * cutoff, 2.0 * cutoff) if other < limit]
-
-
-# Contacts.
+    Raises:
+        DynacomError: as there.
+    """
+    schedule, schedule_text = _find_schedule(clip, robot, schedule)
+    recorded = RecordedMotion(clip.time, clip.q, clip.quaternion_error, clip.v, clip.a, schedule)
+    try:
+        examination = examiner.examine(recorded)
+    except ValueError as error:
+        raise DynacomError(f"{clip.path}: {error}") from error
+    return MotionReport(clip, robot, options, examination, schedule_text)
 
 
 def _find_schedule(
-    clip: Clip,
-    given: str | Path | ContactSchedule | None,
-    contacts: list[ContactMotion],
-    ground: np.ndarray,
-    options: AnalysisOptions,
-) -> tuple[ContactSchedule, str]:
+    clip: Clip, robot: Robot, given: str | Path | ContactSchedule | None
+) -> tuple[ContactSchedule | None, str]:
+    """When contacts are active, if anybody says so, and who does."""
     if isinstance(given, ContactSchedule):
         return given, "Contacts are active as the caller says."
     if given is not None:
-        names = [contact.name for contact in contacts]
-        return read_schedule(given, clip.time, names), f"Contacts are active as {given} says."
+        schedule = read_schedule(given, clip.time, list(robot.contacts))
+        return schedule, f"Contacts are active as {given} says."
     if clip.schedule is not None:
         return clip.schedule, "Contacts are active as the file says."
-    found = detectContacts(contacts, clip.time, ground, options.detection)
-    return found, "Contacts are found from height and speed."
+    return None, "Contacts are found from height and speed."
+
+
+# The summary.
+
+
+def _summarize(report: MotionReport) -> dict[str, Any]:
+    clip, robot, found = report.clip, report.robot, report.examination
+    derived, statistics = found.derived, found.statistics
+    derivatives = _derivatives_text(clip, derived)
+    notes = [
+        *clip.notes,
+        derivatives,
+        report._schedule_text,
+        _ground_text(robot, found.ground, report.options.detection.same_ground),
+    ]
+    solved = statistics.share(DistributionStatus.Solved)
+    residual = statistics.mean_residual.tolist()
+    unexplained = {"share": 1.0 - solved, "force": residual[:3], "torque": residual[3:]}
+    if solved < 1.0:
+        notes.append(_unexplained_text(unexplained))
+    sensitivity = []
+    if derived.cutoff > 0.0:
+        sensitivity = [_residuals(entry) for entry in found.sensitivity]
+        sensitivity.append(_residuals(found, derived.cutoff))
+        sensitivity.sort(key=lambda entry: entry["cutoff"])
+    return {
+        "clip": clip.path.name,
+        "robot": robot.name,
+        "mass": statistics.mass,
+        "frames": statistics.frames,
+        "duration": float(clip.time[-1] - clip.time[0]),
+        "frame_rate": derived.frame_rate,
+        "omega": found.analysis.omega,
+        "verdict": "feasible" if found.verdict.feasible else "not feasible",
+        "codes": _codes(found.verdict),
+        "reasons": _reasons(found.verdict, report.options, statistics.frames),
+        "statuses": {status.name: frames for status, frames in statistics.statuses.items()},
+        "residual_force_rms": statistics.residual_force_rms,
+        "residual_torque_rms": statistics.residual_torque_rms,
+        "notes": notes,
+        "derivatives": derivatives,
+        "cutoff": derived.cutoff or None,
+        "cutoff_sensitivity": sensitivity,
+        "ground": dict(zip(robot.contacts, found.ground.tolist(), strict=True)),
+        "contacts": {
+            contact.name: {name: getattr(contact, name) for name in _CONTACT_STATISTICS}
+            for contact in statistics.contacts
+        },
+        "mean_vertical_force": statistics.mean_vertical_force,
+        "momentum_change": statistics.momentum_change,
+        "unexplained": unexplained,
+        "measured": _compare_forces(clip, found.analysis),
+        "options": report.options.to_dict(),
+    }
+
+
+def _derivatives_text(clip: Clip, derived: DerivedMotion) -> str:
+    """Where velocities and accelerations come from."""
+    mismatch = derived.mismatch
+    differ = f"differ by {mismatch.velocity:.1%} and {mismatch.acceleration:.1%} from"
+    if derived.is_recorded:
+        return (
+            f"Velocities and accelerations are the file's: they {differ} its positions and "
+            "velocities."
+        )
+    if clip.v is None:
+        reason = "the file has none"
+    elif clip.a is None:
+        reason = "the file has velocities only"
+    else:
+        reason = f"the file's {differ} its positions and velocities"
+    how = "without a filter"
+    if derived.cutoff > 0.0:
+        how = (
+            "after a Butterworth filter of 4th order, forward and backward, at "
+            f"{derived.cutoff:g} Hz"
+        )
+    if derived.time_error > 1e-6:
+        how += f", with times made even, by up to {1e3 * derived.time_error:.2g} ms"
+    return f"Velocities and accelerations are computed from the positions, {how}: {reason}."
 
 
 def _ground_text(robot: Robot, ground: np.ndarray, same_ground: float) -> str:
@@ -500,52 +450,6 @@ def _ground_text(robot: Robot, ground: np.ndarray, same_ground: float) -> str:
     if np.abs(ground).min() > _FAR_FROM_ZERO:
         text += " None is near the height 0: is it this robot's motion?"
     return text
-
-
-# Results.
-
-
-def _weight(dynamics: DynaCoM) -> float:
-    """What forces are compared with: m g, of standard gravity where there is none [N]."""
-    return dynamics.getMass() * (-dynamics.getSettings().gravity[2] or 9.81)
-
-
-def _momentum_change(analysis: MotionAnalysis, mass: float) -> float:
-    """What part of the mean vertical force ends in momentum [N]: the clip may begin in a fall."""
-    time, velocity = analysis.time, analysis.vcom[:, 2]
-    duration = time[-1] - time[0]
-    return float(mass * (velocity[-1] - velocity[0]) / duration) if duration > 0.0 else 0.0
-
-
-def _unexplained(clip: Clip, analysis: MotionAnalysis, verdict: MotionVerdict) -> dict[str, Any]:
-    """What the contacts cannot give.
-
-    The mean force [N] and moment about the CoM [N m] are over the frames in which no contact is
-    missing, in the heading's axes: x to where the root looks, z up.
-    """
-    supported = np.ones(len(clip.time), dtype=bool)
-    for code in ("contact_missing", "flight_with_support_needed"):
-        supported &= verdict.findings[code].measured == 0.0
-    x, y, z, w = clip.q[:, 3:7].T
-    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    forward = np.stack([cos, sin, 0.0 * yaw], axis=1)
-    left = np.stack([-sin, cos, 0.0 * yaw], axis=1)
-    residual = analysis.residual.reshape(-1, 2, 3)
-    force, torque = (
-        [
-            _mean((part * forward).sum(axis=1)[supported]),
-            _mean((part * left).sum(axis=1)[supported]),
-            _mean(part[supported, 2]),
-        ]
-        for part in (residual[:, 0], residual[:, 1])
-    )
-    solved = [status.name == "Solved" for status in analysis.status]
-    return {"share": 1.0 - float(np.mean(solved)), "force": force, "torque": torque}
-
-
-def _mean(values: np.ndarray) -> float:
-    return float(values.mean()) if len(values) else 0.0
 
 
 def _unexplained_text(unexplained: dict[str, Any]) -> str:
@@ -592,38 +496,48 @@ def _reasons(verdict: MotionVerdict, options: AnalysisOptions, frames: int) -> l
     return reasons
 
 
-def _residual_rms(analysis: MotionAnalysis, weight: float) -> tuple[float, float]:
-    """Of the force [m g], and of the moment about the CoM [m g m]."""
-    norms = np.linalg.norm(analysis.residual.reshape(-1, 2, 3), axis=2) / weight
-    force, torque = np.sqrt((norms**2).mean(axis=0)).tolist()
-    return force, torque
-
-
 def _residuals(
-    cutoff: float, analysis: MotionAnalysis, verdict: MotionVerdict, weight: float
+    found: MotionExamination | CutoffSensitivity, cutoff: float | None = None
 ) -> dict[str, Any]:
-    rms_force, rms_torque = _residual_rms(analysis, weight)
-    relaxed = [status.name == "Relaxed" for status in analysis.status]
+    statistics = found.statistics
     return {
-        "cutoff": cutoff,
-        "residual_force_rms": rms_force,
-        "residual_torque_rms": rms_torque,
-        "relaxed_share": float(np.mean(relaxed)),
-        "codes": _codes(verdict),
+        "cutoff": found.cutoff if cutoff is None else cutoff,
+        "residual_force_rms": statistics.residual_force_rms,
+        "residual_torque_rms": statistics.residual_torque_rms,
+        "relaxed_share": statistics.share(DistributionStatus.Relaxed),
+        "codes": _codes(found.verdict),
     }
 
 
-def _collect_arrays(
-    clip: Clip, analysis: MotionAnalysis, contacts: list[ContactMotion], ground: np.ndarray
-) -> dict[str, np.ndarray]:
+def _compare_forces(clip: Clip, analysis: MotionAnalysis) -> dict[str, Any]:
+    """Of each contact whose force the file holds: computed minus measured, by component."""
+    compared = {}
+    for contact in analysis.contacts:
+        if contact.name not in clip.forces:
+            continue
+        measured = clip.forces[contact.name]
+        difference = compareMeasured(contact.wrench[:, : measured.shape[1]], measured)
+        if difference.frames > 0:
+            compared[contact.name] = {
+                name: getattr(difference, name).tolist() for name in ("bias", "rms", "correlation")
+            }
+    return compared
+
+
+# The table.
+
+
+def _collect_arrays(clip: Clip, found: MotionExamination) -> dict[str, np.ndarray]:
+    analysis = found.analysis
     names = [name for name, _, _ in _FRAME_COLUMNS if name != "status"]
     arrays = {name: getattr(analysis, name) for name in names}
     arrays["status"] = np.array([status.name for status in analysis.status])
-    for contact, moved, height in zip(analysis.contacts, contacts, ground, strict=True):
+    for contact, moved, height in zip(analysis.contacts, found.contacts, found.ground, strict=True):
+        wrench = contact.wrench
         values = {
             "active": np.asarray(contact.active, dtype=bool),
-            "force": contact.wrench[:, :3],
-            "torque": contact.wrench[:, 3:],
+            "force": wrench[:, :3],
+            "torque": wrench[:, 3:],
             "cop": contact.cop,
             "friction_usage": contact.friction_usage,
             "yaw_usage": contact.yaw_usage,
@@ -640,50 +554,6 @@ def _collect_arrays(
                 values["measured_torque"] = measured[:, 3:]
         arrays |= {f"contact.{contact.name}.{name}": array for name, array in values.items()}
     return arrays
-
-
-def _summarize_contact(contact: MotionAnalysis.Contact, weight: float) -> dict[str, Any]:
-    active = np.asarray(contact.active, dtype=bool)
-    share = contact.vertical_force / weight
-    usage = contact.friction_usage[np.isfinite(contact.friction_usage)]
-    margin = contact.cop_margin[np.isfinite(contact.cop_margin)]
-    return {
-        "active_share": float(active.mean()),
-        "weight_share": float(share.mean()),
-        "weight_share_while_active": float(share[active].mean()) if active.any() else None,
-        "largest_vertical_force": float(share.max()),
-        "largest_friction_usage": float(usage.max()) if len(usage) else None,
-        "least_cop_margin": float(margin.min()) if len(margin) else None,
-    }
-
-
-def _compare_forces(clip: Clip, analysis: MotionAnalysis) -> dict[str, Any]:
-    """Of each contact whose force the file holds: computed minus measured, by component."""
-    compared = {}
-    for contact in analysis.contacts:
-        if contact.name not in clip.forces:
-            continue
-        measured = clip.forces[contact.name]
-        computed = contact.wrench[:, : measured.shape[1]]
-        known = np.isfinite(measured).all(axis=1)
-        if not known.any():
-            continue
-        difference = (computed - measured)[known]
-        compared[contact.name] = {
-            "bias": difference.mean(axis=0).tolist(),
-            "rms": np.sqrt((difference**2).mean(axis=0)).tolist(),
-            "correlation": [
-                _correlation(a, b)
-                for a, b in zip(computed[known].T, measured[known].T, strict=True)
-            ],
-        }
-    return compared
-
-
-def _correlation(a: np.ndarray, b: np.ndarray) -> float | None:
-    if a.std() == 0.0 or b.std() == 0.0:
-        return None
-    return float(np.corrcoef(a, b)[0, 1])
 
 
 def _without_nan(value: Any) -> Any:

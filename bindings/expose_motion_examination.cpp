@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "bindings.hpp"
+#include "dynacom/motion_examination.hpp"
+
+namespace dynacom::python {
+
+namespace {
+
+using Examination = MotionExamination;
+
+bp::list getContacts(const Examination& examination) { return toList(examination.contacts); }
+
+bp::list getSensitivity(const Examination& examination) { return toList(examination.sensitivity); }
+
+std::string writeExamination(const Examination& examination) {
+  return internal::concat("MotionExamination(frames=", examination.statistics.frames,
+                          ", feasible=", examination.verdict.isFeasible() ? "True" : "False", ")");
+}
+
+std::string writeSensitivity(const CutoffSensitivity& sensitivity) {
+  return internal::concat("CutoffSensitivity(cutoff=", sensitivity.cutoff,
+                          ", feasible=", sensitivity.verdict.isFeasible() ? "True" : "False", ")");
+}
+
+/// MotionExaminer for Python, where progress is an object, which has to live as long.
+class Examiner {
+ public:
+  Examiner(const DynaCoM& robot, double cutoff, bool flat_horizontal_ground, double omega,
+           const DetectionSettings& detection, const VerdictSettings& verdict, bool sensitivity,
+           const bp::object& progress, int threads, int lanes)
+      : progress_(progress),
+        examiner_(robot, {cutoff,
+                          {flat_horizontal_ground, omega, nullptr, threads, lanes},
+                          detection,
+                          verdict,
+                          sensitivity,
+                          toProgress<double>(progress_)}) {}
+
+  Examination examine(const RecordedMotion& recorded) const {
+    const WithoutLock without_lock;
+    return examiner_.examine(recorded);
+  }
+
+ private:
+  const bp::object progress_;
+  const MotionExaminer examiner_;
+};
+
+std::string writeExaminer(const Examiner&) { return "MotionExaminer()"; }
+
+std::shared_ptr<Examiner> makeExaminer(const DynaCoM& robot, double cutoff,
+                                       bool flat_horizontal_ground, double omega,
+                                       const DetectionSettings& detection,
+                                       const VerdictSettings& verdict, bool sensitivity,
+                                       const bp::object& progress, int threads, int lanes) {
+  return std::make_shared<Examiner>(robot, cutoff, flat_horizontal_ground, omega, detection,
+                                    verdict, sensitivity, progress, threads, lanes);
+}
+
+}  // namespace
+
+void exposeMotionExamination() {
+  bp::class_<CutoffSensitivity>("CutoffSensitivity",
+                                "What another cut-off frequency would have led to.", bp::no_init)
+      .def_readonly("cutoff", &CutoffSensitivity::cutoff, "[Hz]")
+      .def_readonly("verdict", &CutoffSensitivity::verdict, "The MotionVerdict")
+      .def_readonly("statistics", &CutoffSensitivity::statistics, "The MotionStatistics")
+      .def(PrintVisitor<CutoffSensitivity>(&writeSensitivity))
+      .def(CopyVisitor<CutoffSensitivity>());
+
+  bp::class_<Examination>("MotionExamination",
+                          "All that was found of a recorded motion, see examineMotion.",
+                          bp::no_init)
+      .def_readonly("derived", &Examination::derived, "The DerivedMotion")
+      .add_property("contacts", &getContacts, "A ContactMotion for each contact")
+      .add_property("ground", getter(&Examination::ground),
+                    "Height of the ground under each contact, (C,) [m]")
+      .def_readonly("schedule", &Examination::schedule, "The ContactSchedule")
+      .def_readonly("analysis", &Examination::analysis, "The MotionAnalysis")
+      .def_readonly("verdict", &Examination::verdict, "The MotionVerdict")
+      .def_readonly("statistics", &Examination::statistics, "The MotionStatistics")
+      .add_property("sensitivity", &getSensitivity,
+                    "A CutoffSensitivity for half, and for twice the cut-off")
+      .def(PrintVisitor<Examination>(&writeExamination))
+      .def(CopyVisitor<Examination>());
+
+  const ExaminationSettings defaults;
+  bp::class_<Examiner, std::shared_ptr<Examiner>, boost::noncopyable>(
+      "MotionExaminer",
+      "Judges recorded motions of one robot, a DynaCoM, which is copied: deriveMotion,\n"
+      "computeContactMotions, estimateGround, detectContacts unless a schedule was recorded,\n"
+      "analyzeMotion, judgeMotion and summarizeMotion, one after the other. The ground that the\n"
+      "centre of pressure lies on is the mean of those below the contacts. Threads and copies of\n"
+      "the robot are kept from one motion to the next.",
+      bp::no_init)
+      .def("__init__",
+           bp::make_constructor(
+               &makeExaminer, bp::default_call_policies(),
+               (bp::arg("robot"), bp::arg("cutoff") = defaults.cutoff,
+                bp::arg("flatHorizontalGround") = defaults.analysis.flat_horizontal_ground,
+                bp::arg("omega") = defaults.analysis.omega,
+                bp::arg("detection") = defaults.detection, bp::arg("verdict") = defaults.verdict,
+                bp::arg("sensitivity") = defaults.sensitivity, bp::arg("progress") = bp::object(),
+                bp::arg("threads") = defaults.analysis.threads,
+                bp::arg("lanes") = defaults.analysis.lanes)),
+           "cutoff: of the filter where derivatives have to be computed, 0 for none [Hz];\n"
+           "sensitivity: whether to judge motions with half and twice the cut-off, too; progress:\n"
+           "called now and then with what part of the frames is analysed; the others as in the\n"
+           "functions named above. Raises ValueError if one is out of its range, NotReadyError\n"
+           "before the robot's initialize().")
+      .def("examine", &Examiner::examine, (bp::arg("self"), bp::arg("recorded")),
+           "The MotionExamination of a RecordedMotion, whatever was examined before. Raises\n"
+           "ValueError if the motion or its schedule is not valid.")
+      .def(PrintVisitor<Examiner>(&writeExaminer));
+}
+
+}  // namespace dynacom::python

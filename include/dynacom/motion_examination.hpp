@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynacom/motion_statistics.hpp"
+#include "dynacom/recorded_motion.hpp"
+
+namespace dynacom {
+
+/// What examineMotion() needs to know besides.
+struct DYNACOM_EXPORT ExaminationSettings {
+  /// Of the filter where velocities and accelerations have to be computed [Hz]; 0 for none.
+  double cutoff = 6.;
+  /// Its threads do all of it. Its own progress is told nothing, but the one below.
+  AnalysisSettings analysis = {};
+  DetectionSettings detection = {};
+  VerdictSettings verdict = {};
+  /// Whether to judge the motion with half and twice the cut-off, too, where a filter is needed and
+  /// takes them.
+  bool sensitivity = false;
+  /// Called now and then, in the caller's thread, with what part of the frames is analysed, which
+  /// increases up to 1.
+  std::function<void(double)> progress = nullptr;
+
+  /// @throws std::invalid_argument naming the first field out of its range
+  void validate() const;
+};
+
+/// What another cut-off frequency would have led to.
+struct CutoffSensitivity {
+  double cutoff;  ///< [Hz]
+  MotionVerdict verdict;
+  MotionStatistics statistics;
+};
+
+/// All that was found of a recorded motion, step by step.
+struct MotionExamination {
+  DerivedMotion derived;
+  std::vector<ContactMotion> contacts;  ///< computeContactMotions()
+  Eigen::VectorXd ground;               ///< estimateGround() [m]
+  ContactSchedule schedule;             ///< as recorded, else detectContacts()
+  MotionAnalysis analysis;
+  MotionVerdict verdict;
+  MotionStatistics statistics;
+  std::vector<CutoffSensitivity> sensitivity;  ///< with half, and with twice the cut-off
+};
+
+/// Judges recorded motions of one robot. What it needs for that, threads and copies of the robot,
+/// it keeps from one motion to the next: for short clips, these would take as long as the motion.
+class DYNACOM_EXPORT MotionExaminer {
+ public:
+  /// @param robot  is copied
+  /// @throws std::invalid_argument if settings are not valid; NotReadyError before the robot's
+  ///         initialize()
+  explicit MotionExaminer(const DynaCoM& robot, const ExaminationSettings& settings = {});
+  ~MotionExaminer();
+  MotionExaminer(MotionExaminer&&) noexcept;
+  MotionExaminer& operator=(MotionExaminer&&) noexcept;
+
+  const ExaminationSettings& getSettings() const;
+
+  /// Finds a motion's derivatives, what its contacts do and where the ground is, and what that asks
+  /// of them. The ground that the centre of pressure lies on is the mean of those below the
+  /// contacts. Results do not depend on what was examined before; several threads may call this at
+  /// once.
+  /// @throws std::invalid_argument if the motion or its schedule is not valid, see deriveMotion()
+  ///         and analyzeMotion()
+  MotionExamination examine(const RecordedMotion& recorded) const;
+
+ private:
+  struct Office;
+  friend void analyzeMotions(
+      const DynaCoM&, std::size_t, const std::function<RecordedMotion(std::size_t)>&,
+      const std::function<void(std::size_t, const MotionExamination*, const std::string&)>&,
+      const ExaminationSettings&);
+
+  std::unique_ptr<Office> office_;
+};
+
+/// Judges one recorded motion, see MotionExaminer::examine().
+/// @throws as MotionExaminer
+DYNACOM_EXPORT MotionExamination examineMotion(const DynaCoM& robot, const RecordedMotion& recorded,
+                                               const ExaminationSettings& settings = {});
+
+/// Judges many recorded motions, of one robot. A pool of threads, ExaminationSettings::analysis's,
+/// takes clip after clip; those that find none left take part in what is not done yet. Never are
+/// there more clips in memory than threads, and results do not depend on their number, bit for bit.
+/// @param clips     how many
+/// @param read      gives a clip by its number, 0 to clips − 1, in order; called by several threads
+///                  at once
+/// @param done      takes a clip's number with what was found of it, or null and the message of
+///                  what was thrown by `read` or MotionExaminer::examine(), which is the end of
+///                  that clip only. Called by one thread at a time, in the order in which clips are
+///                  done
+/// @param settings  the progress is not told
+/// @throws what `done` throws, once all threads have stopped; std::invalid_argument if settings are
+///         not valid; NotReadyError before the robot's initialize()
+DYNACOM_EXPORT void analyzeMotions(
+    const DynaCoM& robot, std::size_t clips, const std::function<RecordedMotion(std::size_t)>& read,
+    const std::function<void(std::size_t, const MotionExamination*, const std::string&)>& done,
+    const ExaminationSettings& settings = {});
+
+}  // namespace dynacom

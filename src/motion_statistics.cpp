@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/motion_statistics.hpp"
+
+#include <cmath>
+
+#include "check.hpp"
+#include "nan.hpp"
+
+namespace dynacom {
+
+using internal::kNaN;
+
+namespace {
+
+// What forces are compared with where there is no gravity [m/s²].
+constexpr double kStandardGravity = 9.81;
+
+// Of the numbers that are not NaN; NaN if there are none.
+double largestOf(const Eigen::VectorXd& numbers) {
+  double largest = kNaN;
+  for (const double number : numbers) largest = std::fmax(largest, number);
+  return largest;
+}
+
+double rootMeanSquare(const Eigen::Ref<const Eigen::MatrixXd>& columns) {
+  return std::sqrt(columns.squaredNorm() / double(columns.cols()));
+}
+
+ContactStatistics summarize(const MotionAnalysis::Contact& contact, double weight) {
+  ContactStatistics statistics = {};
+  const auto frames = double(contact.active.size());
+  const auto active = double(contact.active.count());
+  statistics.name = contact.name;
+  statistics.active_share = active / frames;
+  statistics.weight_share = contact.vertical_force.mean() / weight;
+  // Where it is not active, it has no force.
+  statistics.weight_share_while_active =
+      active > 0. ? contact.vertical_force.sum() / (weight * active) : kNaN;
+  statistics.largest_vertical_force = contact.vertical_force.maxCoeff() / weight;
+  statistics.largest_friction_usage = largestOf(contact.friction_usage);
+  statistics.least_cop_margin = -largestOf(-contact.cop_margin);
+  return statistics;
+}
+
+// The residual in the heading's axes, averaged over the frames that lack no contact.
+MotionStatistics::Vector6 findMeanResidual(const pinocchio::Model& model, const Motion& motion,
+                                           const MotionAnalysis& analysis,
+                                           const MotionVerdict& verdict) {
+  const bool flies = model.njoints > 1 && model.joints[1].nv() == 6;
+  const Eigen::VectorXd& missing = verdict[MotionFault::ContactMissing].measured;
+  const Eigen::VectorXd& flight = verdict[MotionFault::FlightWithSupportNeeded].measured;
+  MotionStatistics::Vector6 sum = MotionStatistics::Vector6::Zero();
+  Eigen::Index frames = 0;
+  for (Eigen::Index frame = 0; frame < motion.frames(); ++frame) {
+    if (missing[frame] != 0. || flight[frame] != 0.) continue;
+    ++frames;
+    MotionStatistics::Vector6 residual = analysis.residual.col(frame);
+    if (flies) {
+      const auto q = motion.q.col(frame).segment<4>(3);
+      const Eigen::Rotation2Dd heading(
+          std::atan2(2. * (q[3] * q[2] + q[0] * q[1]), 1. - 2. * (q[1] * q[1] + q[2] * q[2])));
+      residual.head<2>() = heading.inverse() * residual.head<2>();
+      residual.segment<2>(3) = heading.inverse() * residual.segment<2>(3);
+    }
+    sum += residual;
+  }
+  if (frames > 0) sum /= double(frames);
+  return sum;
+}
+
+double correlate(const Eigen::VectorXd& one, const Eigen::VectorXd& other) {
+  const Eigen::VectorXd a = one.array() - one.mean(), b = other.array() - other.mean();
+  const double size = a.norm() * b.norm();
+  return size > 0. ? a.dot(b) / size : kNaN;
+}
+
+}  // namespace
+
+double MotionStatistics::share(DistributionStatus status) const {
+  const auto found = statuses.find(status);
+  return found == statuses.end() ? 0. : double(found->second) / double(frames);
+}
+
+MotionStatistics summarizeMotion(const DynaCoM& robot, const Motion& motion,
+                                 const MotionAnalysis& analysis, const MotionVerdict& verdict) {
+  if (!robot.isInitialized())
+    throw NotReadyError("DynaCoM is used by summarizeMotion before initialize()");
+  const Eigen::Index frames = motion.frames();
+  internal::requireSize("motion.q", motion.q.rows(), Eigen::Index(robot.getModel().nq),
+                        "components (nq)");
+  internal::requireSize("motion.q", motion.q.cols(), frames, "frames");
+  internal::requireSize("analysis", Eigen::Index(analysis.status.size()), frames, "frames");
+  internal::requireSize("verdict", verdict[MotionFault::ContactMissing].measured.size(), frames,
+                        "frames");
+  if (frames == 0) internal::throwInvalid("motion must have at least one frame, got 0");
+
+  const double gravity = -robot.getSettings().gravity.z();
+  MotionStatistics statistics = {};
+  statistics.frames = frames;
+  statistics.mass = robot.getMass();
+  statistics.weight = statistics.mass * (gravity > 0. ? gravity : kStandardGravity);
+  for (const DistributionStatus status : analysis.status) ++statistics.statuses[status];
+  statistics.mean_vertical_force = analysis.ground_force.row(2).mean() / statistics.weight;
+  if (frames > 1)
+    statistics.momentum_change = robot.getMass() *
+                                 (analysis.vcom(2, frames - 1) - analysis.vcom(2, 0)) /
+                                 (statistics.weight * (motion.time[frames - 1] - motion.time[0]));
+  statistics.residual_force_rms =
+      rootMeanSquare(analysis.residual.topRows<3>()) / statistics.weight;
+  statistics.residual_torque_rms =
+      rootMeanSquare(analysis.residual.bottomRows<3>()) / statistics.weight;
+  statistics.mean_residual = findMeanResidual(robot.getModel(), motion, analysis, verdict);
+  for (const MotionAnalysis::Contact& contact : analysis.contacts)
+    statistics.contacts.push_back(summarize(contact, statistics.weight));
+  return statistics;
+}
+
+MeasuredDifference compareMeasured(const Eigen::MatrixXd& computed,
+                                   const Eigen::MatrixXd& measured) {
+  internal::requireSize("computed", computed.rows(), measured.rows(), "components (as measured)");
+  internal::requireSize("computed", computed.cols(), measured.cols(), "frames (as measured)");
+  Eigen::MatrixXd a(computed.rows(), computed.cols()), b = a;
+  MeasuredDifference difference = {};
+  for (Eigen::Index frame = 0; frame < measured.cols(); ++frame) {
+    if (!internal::areFinite(measured.col(frame))) continue;
+    a.col(difference.frames) = computed.col(frame);
+    b.col(difference.frames++) = measured.col(frame);
+  }
+  a.conservativeResize(Eigen::NoChange, difference.frames);
+  b.conservativeResize(Eigen::NoChange, difference.frames);
+  difference.bias = difference.rms = difference.correlation =
+      Eigen::VectorXd::Constant(computed.rows(), kNaN);
+  if (difference.frames == 0) return difference;
+  difference.bias = (a - b).rowwise().mean();
+  difference.rms = ((a - b).array().square().rowwise().mean()).sqrt();
+  for (Eigen::Index row = 0; row < a.rows(); ++row)
+    difference.correlation[row] = correlate(a.row(row), b.row(row));
+  return difference;
+}
+
+}  // namespace dynacom

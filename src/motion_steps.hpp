@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <vector>
+
+#include "desks.hpp"
+#include "dynacom/motion_verdict.hpp"
+#include "workers.hpp"
+
+// The steps of an examination, by threads that are there already. Their public namesakes bring
+// threads of their own.
+
+namespace dynacom::internal {
+
+std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot, const Motion& motion,
+                                                 Workers& workers);
+
+/// @param ground_height  in place of the robot's [m]
+/// @param settings       of which the threads are not looked at
+MotionAnalysis analyzeMotion(Desks& desks, double ground_height, const Motion& motion,
+                             const ContactSchedule& schedule, const AnalysisSettings& settings,
+                             Workers& workers);
+
+MotionVerdict judgeMotion(Desks& desks, const Motion& motion, const RecordedMotion& recorded,
+                          const std::vector<ContactMotion>& contacts, const Eigen::VectorXd& ground,
+                          const MotionAnalysis& analysis, const VerdictSettings& settings,
+                          Workers& workers);
+
+}  // namespace dynacom::internal

@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#define BOOST_TEST_MODULE motion_examination
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <mutex>
+#include <set>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "dynacom/motion_examination.hpp"
+#include "feet.hpp"
+#include "random_robot.hpp"
+
+using namespace dynacom;
+using namespace dynacom_tests;
+
+namespace {
+
+/// A body above two soles, and clips of it: it sways, each time by another amount, so that some
+/// frames are out of reach, and its right foot is off the ground for a while.
+struct Clips {
+  Clips() : model(singleBody(10., stance(2))), robot(model) {
+    for (const char* frame : {"sole0", "sole1"}) robot.addContact(makeSole(frame), frame);
+  }
+
+  RecordedMotion make(std::size_t number, Index frames = 600) const {
+    RecordedMotion recorded;
+    recorded.time = VectorXd::LinSpaced(frames, 0., 0.01 * double(frames - 1));
+    recorded.q = restState(model).q.replicate(1, frames);
+    const Eigen::ArrayXd t = recorded.time.array();
+    const double size = 0.02 * double(number + 1);
+    recorded.q.row(0) = size * (4. * t).sin() * (1.3 * t).cos();
+    recorded.q.row(1) = 0.5 * size * (3. * t).sin();
+    recorded.schedule = ContactSchedule{robot.getKnownContacts(),
+                                        ContactSchedule::Matrix::Constant(2, frames, true)};
+    recorded.schedule->active.row(1).segment(frames / 3, frames / 4).setConstant(false);
+    return recorded;
+  }
+
+  pinocchio::Model model;
+  DynaCoM robot;
+};
+
+/// All numbers of a matrix and others, bit for bit.
+void append(std::vector<double>& numbers, const Eigen::Ref<const MatrixXd>& values) {
+  for (Index col = 0; col < values.cols(); ++col)
+    for (Index row = 0; row < values.rows(); ++row) numbers.push_back(values(row, col));
+}
+
+std::vector<double> numbersOf(const MotionExamination& found) {
+  std::vector<double> numbers;
+  append(numbers, found.derived.motion.a);
+  append(numbers, found.ground);
+  append(numbers, found.analysis.residual);
+  append(numbers, found.analysis.cop);
+  append(numbers, found.analysis.nl);
+  for (const ContactMotion& contact : found.contacts) append(numbers, contact.velocity);
+  for (const MotionAnalysis::Contact& contact : found.analysis.contacts)
+    append(numbers, contact.wrench);
+  for (const MotionFinding& finding : found.verdict.findings) append(numbers, finding.measured);
+  append(numbers, found.statistics.mean_residual);
+  numbers.push_back(found.statistics.residual_torque_rms);
+  for (const CutoffSensitivity& other : found.sensitivity) {
+    numbers.push_back(other.cutoff);
+    numbers.push_back(other.statistics.residual_torque_rms);
+  }
+  return numbers;
+}
+
+bool sameBits(const std::vector<double>& one, const std::vector<double>& other) {
+  return one.size() == other.size() &&
+         std::memcmp(one.data(), other.data(), one.size() * sizeof(double)) == 0;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(an_examination_is_its_steps) {
+  const Clips clips;
+  RecordedMotion recorded = clips.make(2);
+  recorded.quaternion_error = VectorXd::LinSpaced(recorded.time.size(), 0., 0.002);
+  for (const bool scheduled : {true, false}) {
+    if (!scheduled) recorded.schedule.reset();
+    ExaminationSettings settings;
+    settings.cutoff = 10.;
+    settings.analysis.omega = 3.;
+    settings.detection.height = 0.01;
+    settings.verdict.near_ground = 0.02;
+    const MotionExamination found = examineMotion(clips.robot, recorded, settings);
+
+    DynaCoM robot = clips.robot;
+    const DerivedMotion derived = deriveMotion(clips.model, recorded, 10.);
+    const auto contacts = computeContactMotions(robot, derived.motion);
+    const VectorXd ground = estimateGround(contacts, recorded.time, settings.detection);
+    const ContactSchedule schedule =
+        scheduled ? *recorded.schedule
+                  : detectContacts(contacts, recorded.time, ground, settings.detection);
+    robot.setGroundHeight(ground.mean());
+    const MotionAnalysis analysis =
+        analyzeMotion(robot, derived.motion, schedule, settings.analysis);
+    const MotionVerdict verdict =
+        judgeMotion(robot, derived.motion, recorded, contacts, ground, analysis, settings.verdict);
+    const MotionStatistics statistics = summarizeMotion(robot, derived.motion, analysis, verdict);
+
+    BOOST_TEST(close(found.derived.motion.a, derived.motion.a, 0.));
+    BOOST_TEST(close(found.ground, ground, 0.));
+    BOOST_TEST((found.schedule.active.array() == schedule.active.array()).all());
+    BOOST_TEST(close(found.analysis.cop, analysis.cop, 0.));
+    BOOST_TEST(close(found.analysis.residual, analysis.residual, 0.));
+    BOOST_TEST(found.analysis.omega == 3.);
+    for (std::size_t k = 0; k < kMotionFaults; ++k)
+      BOOST_TEST(close(found.verdict.findings[k].measured, verdict.findings[k].measured, 0.));
+    BOOST_TEST(found.statistics.residual_force_rms == statistics.residual_force_rms);
+    BOOST_TEST(found.sensitivity.empty());
+    // Something is out of reach, and something is not.
+    BOOST_TEST(found.statistics.share(DistributionStatus::Solved) > 0.1);
+    BOOST_TEST(found.statistics.share(DistributionStatus::Relaxed) > 0.1);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(other_cutoffs_are_tried_where_there_was_a_filter) {
+  const Clips clips;
+  RecordedMotion recorded = clips.make(2);
+  ExaminationSettings settings;
+  settings.sensitivity = true;
+  std::vector<double> told;
+  settings.progress = [&](double part) { told.push_back(part); };
+  MotionExamination found = examineMotion(clips.robot, recorded, settings);
+  BOOST_REQUIRE(found.sensitivity.size() == 2u);
+  for (const std::size_t k : {0, 1}) {
+    ExaminationSettings other;
+    other.cutoff = k == 0 ? 3. : 12.;
+    const MotionExamination expected = examineMotion(clips.robot, recorded, other);
+    BOOST_TEST(found.sensitivity[k].cutoff == other.cutoff);
+    BOOST_TEST(found.sensitivity[k].statistics.residual_torque_rms ==
+               expected.statistics.residual_torque_rms);
+    BOOST_TEST(expected.statistics.residual_torque_rms != found.statistics.residual_torque_rms);
+  }
+  BOOST_TEST(std::is_sorted(told.begin(), told.end()));
+  BOOST_TEST(told.back() == 1.);
+
+  // Twice this is too much for the frame rate.
+  settings.cutoff = 25.;
+  BOOST_TEST(examineMotion(clips.robot, recorded, settings).sensitivity.size() == 1u);
+  settings.cutoff = 0.;
+  BOOST_TEST(examineMotion(clips.robot, recorded, settings).sensitivity.empty());
+  BOOST_TEST(told.back() == 1.);
+}
+
+BOOST_AUTO_TEST_CASE(an_examiner_has_no_memory_of_motions) {
+  const Clips clips;
+  ExaminationSettings settings;
+  settings.analysis.threads = 3;
+  const MotionExaminer examiner(clips.robot, settings);
+  for (const std::size_t number : {3, 0, 2, 3, 1}) {
+    const auto expected = numbersOf(examineMotion(clips.robot, clips.make(number), settings));
+    BOOST_TEST(sameBits(numbersOf(examiner.examine(clips.make(number))), expected));
+  }
+  BOOST_TEST(examiner.getSettings().analysis.threads == 3);
+
+  // It has a robot of its own.
+  Clips other;
+  const auto expected = numbersOf(examineMotion(other.robot, other.make(1)));
+  const MotionExaminer own(other.robot);
+  other.robot.removeContact("sole0");
+  BOOST_TEST(sameBits(numbersOf(own.examine(other.make(1))), expected));
+}
+
+BOOST_AUTO_TEST_CASE(threads_may_share_an_examiner) {
+  const Clips clips;
+  ExaminationSettings settings;
+  settings.analysis.threads = 2;
+  const MotionExaminer examiner(clips.robot, settings);
+  std::vector<std::vector<double>> found(4);
+  std::vector<std::thread> threads;
+  for (std::size_t k = 0; k < found.size(); ++k)
+    threads.emplace_back([&, k] { found[k] = numbersOf(examiner.examine(clips.make(k))); });
+  for (std::thread& thread : threads) thread.join();
+  for (std::size_t k = 0; k < found.size(); ++k)
+    BOOST_TEST(sameBits(found[k], numbersOf(examineMotion(clips.robot, clips.make(k)))));
+}
+
+BOOST_AUTO_TEST_CASE(many_motions_are_each_what_they_are_alone) {
+  const Clips clips;
+  const std::size_t count = 23;
+  std::vector<std::vector<double>> expected;
+  for (std::size_t k = 0; k < count; ++k)
+    expected.push_back(
+        numbersOf(examineMotion(clips.robot, clips.make(k % 5, 100 + 40 * Index(k)))));
+  for (const int threads : {1, 2, 5}) {
+    ExaminationSettings settings;
+    settings.analysis.threads = threads;
+    settings.progress = [](double) { BOOST_ERROR("nobody asked"); };
+    std::vector<int> times(count);
+    std::atomic<int> in_memory{0};
+    std::atomic<bool> inside{false};
+    bool is_alone = true;
+    int most = 0;
+    bool is_alone = true;
+    std::mutex mutex;
+    analyzeMotions(
+        clips.robot, count,
+        [&](std::size_t k) {
+          const int now = ++in_memory;
+          const std::lock_guard<std::mutex> lock(mutex);
+          most = std::max(most, now);
+          return clips.make(k % 5, 100 + 40 * Index(k));
+        },
+        [&](std::size_t k, const MotionExamination* found, const std::string& error) {
+          is_alone = is_alone && !inside.exchange(true);
+          ++times[k];
+          BOOST_REQUIRE(found != nullptr);
+          BOOST_TEST(error.empty());
+          BOOST_TEST(sameBits(numbersOf(*found), expected[k]));
+          --in_memory;
+          inside = false;
+        },
+        settings);
+    BOOST_TEST(is_alone);
+    BOOST_TEST((std::set<int>(times.begin(), times.end()) == std::set<int>{1}));
+    BOOST_TEST(most <= threads);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_clip_that_fails_is_no_end) {
+  const Clips clips;
+  for (const int threads : {1, 3}) {
+    ExaminationSettings settings;
+    settings.analysis.threads = threads;
+    std::vector<std::string> errors(6, "not done");
+    analyzeMotions(
+        clips.robot, errors.size(),
+        [&](std::size_t k) {
+          RecordedMotion recorded = clips.make(k, 50);
+          if (k == 1) throw std::runtime_error("no such file");
+          if (k == 2) throw 7;
+          if (k == 3) recorded.q(0, 5) = std::numeric_limits<double>::quiet_NaN();
+          if (k == 4) recorded.time.resize(0);
+          return recorded;
+        },
+        [&](std::size_t k, const MotionExamination* found, const std::string& error) {
+          BOOST_TEST((found == nullptr) == !error.empty());
+          errors[k] = error;
+        },
+        settings);
+    BOOST_TEST(errors[0] == "");
+    BOOST_TEST(errors[1] == "no such file");
+    BOOST_TEST(errors[2] == "unknown exception");
+    BOOST_TEST(mentions(errors[3], "frame 5"));
+    BOOST_TEST(mentions(errors[4], "time"));
+    BOOST_TEST(errors[5] == "");
+  }
+}
+
+BOOST_AUTO_TEST_CASE(what_is_done_with_results_may_end_the_job) {
+  const Clips clips;
+  std::atomic<int> read{0};
+  const auto work = [&] {
+    analyzeMotions(
+        clips.robot, 1000,
+        [&](std::size_t) {
+          ++read;
+          return clips.make(0, 20);
+        },
+        [](std::size_t, const MotionExamination*, const std::string&) {
+          throw std::runtime_error("disk full");
+        });
+  };
+  BOOST_TEST(throws<std::runtime_error>(work, {"disk full"}));
+  BOOST_TEST(read < 1000);
+  int done = 0;
+  analyzeMotions(
+      clips.robot, 0, [&](std::size_t k) { return clips.make(k); },
+      [&](std::size_t, const MotionExamination*, const std::string&) { ++done; });
+  BOOST_TEST(done == 0);
+}
+
+BOOST_AUTO_TEST_CASE(what_cannot_be_examined_is_refused) {
+  const Clips clips;
+  const auto refused = [&](const auto& change, std::initializer_list<std::string> words) {
+    ExaminationSettings settings;
+    change(settings);
+    BOOST_TEST(throws<std::invalid_argument>([&] { settings.validate(); }, words));
+    BOOST_TEST(throws<std::invalid_argument>(
+        [&] { examineMotion(clips.robot, clips.make(0), settings); }, words));
+  };
+  refused([](auto& s) { s.cutoff = -1.; }, {"ExaminationSettings.cutoff", ">=", "-1"});
+  refused([](auto& s) { s.cutoff = std::numeric_limits<double>::infinity(); }, {"finite", "inf"});
+  refused([](auto& s) { s.analysis.threads = -1; }, {"AnalysisSettings.threads", "-1"});
+  refused([](auto& s) { s.detection.height = -1.; }, {"DetectionSettings.height"});
+  refused([](auto& s) { s.verdict.near_ground = -1.; }, {"VerdictSettings.near_ground"});
+
+  RecordedMotion recorded = clips.make(0);
+  recorded.schedule->names[0] = "nose";
+  BOOST_TEST(
+      throws<std::invalid_argument>([&] { examineMotion(clips.robot, recorded); }, {"nose"}));
+  BOOST_TEST(throws<NotReadyError>([&] { MotionExaminer{DynaCoM()}; }, {"MotionExaminer"}));
+  BOOST_TEST(throws<NotReadyError>(
+      [&] {
+        analyzeMotions(
+            DynaCoM(), 1, [&](std::size_t k) { return clips.make(k); },
+            [](std::size_t, const MotionExamination*, const std::string&) {});
+      },
+      {"initialize"}));
+}
