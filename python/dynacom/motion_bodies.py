@@ -17,8 +17,6 @@ from dynacom.errors import DynacomError
 from dynacom.motion_joints import (
     ROOT_JOINT,
     configurations,
-    is_revolute,
-    joint_names,
     rotations,
     tree_orders,
     wrong_count,
@@ -155,9 +153,7 @@ def find_order(
 
 
 def _from_degrees(robot: Robot, names: Sequence[str], angles: np.ndarray) -> np.ndarray:
-    model = robot.model
-    turns = [is_revolute(model.joints[model.getJointId(name)]) for name in names]
-    return np.where(turns, np.deg2rad(angles), angles)
+    return np.where(robot.joints.take(names).turns, np.deg2rad(angles), angles)
 
 
 def _agreement(error: float) -> str:
@@ -175,7 +171,7 @@ def _candidates(robot: Robot, count: int) -> list[tuple[str, tuple[str, ...]]]:
     """Orders of so many joints, and what they are called."""
     trees = tree_orders(robot)
     candidates = []
-    if count == len(joint_names(robot)):
+    if count == len(robot.joints.names):
         candidates += trees.items()
     for layout in robot.joint_layouts:
         if len(layout) == count:
@@ -251,11 +247,11 @@ def _match_columns(robot: Robot, angles: np.ndarray, bodies: BodySample) -> tupl
     or prismatic ones, or no body that fits.
     """
     model = robot.model
-    names = joint_names(robot)
+    names = robot.joints.names
     count = len(names)
     if angles.shape[1] != count or count != model.njoints - ROOT_JOINT - 1:
         return None
-    if not all(is_revolute(model.joints[model.getJointId(name)]) for name in names):
+    if not robot.joints.turns.all():
         return None
     axes = _axes(model)
     angles = angles[bodies.frames]

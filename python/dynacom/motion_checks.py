@@ -5,13 +5,13 @@ Frames count from 0. All limits stand here; they are generous, so that what goes
 in the file or in how it was read, and no motion.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from dynacom.errors import DynacomError
-from dynacom.motion_joints import is_revolute, joint_angles, joint_names
+from dynacom.motion_joints import joint_angles
 from dynacom.robots import Robot
 
 #: |norm - 1| of a quaternion: more than rounding and interpolation do to it.
@@ -39,11 +39,11 @@ JOINT_SPEED = 50.0
 _ORDERS = {"xyzw": "x y z w", "wxyz": "w x y z"}
 
 
-def check_finite(path: Path, what: str | Sequence[str], values: np.ndarray) -> None:
+def check_finite(path: Path, what: str | Callable[[int], str], values: np.ndarray) -> None:
     """Refuses NaN and infinity.
 
     Args:
-        what: the array's name, or those of its columns.
+        what: the array's name, or its columns' by their indices.
         values: (T, ...).
 
     Raises:
@@ -55,7 +55,7 @@ def check_finite(path: Path, what: str | Sequence[str], values: np.ndarray) -> N
     frame, *column = map(int, np.argwhere(~finite)[0])
     value = values[(frame, *column)]
     if not isinstance(what, str):
-        what, column = what[column[0]], []
+        what, column = what(column[0]), []
     where = f" of column {', '.join(map(str, column))}" if column else ""
     raise DynacomError(f"{path}: {what} must be finite, got {value} in frame {frame}{where}")
 
@@ -155,19 +155,22 @@ def normalize(
         other = "wxyz" if order == "xyzw" else "xyzw"
         # The file's columns as they would be in the other order.
         columns = quaternion if order == "xyzw" else quaternion[:, [3, 0, 1, 2]]
-        up, other_up = _uprightness(quaternion), _uprightness(to_xyzw(columns, other))
-        if up < NOT_UPRIGHT and other_up > UPRIGHT:
-            raise DynacomError(
-                f"{path}: the root's quaternions must be {_ORDERS[order]}, got {_ORDERS[other]}: "
-                f"they turn its z axis to a height of {up:.2f} in the median frame, and to "
-                f"{other_up:.2f} in the other order" + (f"; give --quat {other}" if option else "")
-            )
+        heights = _heights(quaternion)
+        if heights.min() < NOT_UPRIGHT:  # else their median is not either
+            up, other_up = np.median(heights), np.median(_heights(to_xyzw(columns, other)))
+            if up < NOT_UPRIGHT and other_up > UPRIGHT:
+                raise DynacomError(
+                    f"{path}: the root's quaternions must be {_ORDERS[order]}, got "
+                    f"{_ORDERS[other]}: they turn its z axis to a height of {up:.2f} in the median "
+                    f"frame, and to {other_up:.2f} in the other order"
+                    + (f"; give --quat {other}" if option else "")
+                )
     return quaternion, error
 
 
-def _uprightness(quaternion: np.ndarray) -> float:
-    """Vertical component of the root's z axis in the median frame."""
-    return float(np.median(1.0 - 2.0 * (quaternion[:, 0] ** 2 + quaternion[:, 1] ** 2)))
+def _heights(quaternion: np.ndarray) -> np.ndarray:
+    """Vertical component of the root's z axis, (T,)."""
+    return 1.0 - 2.0 * (quaternion[:, 0] ** 2 + quaternion[:, 1] ** 2)
 
 
 def check_angles(path: Path, robot: Robot, names: Sequence[str], angles: np.ndarray) -> list[str]:
@@ -180,17 +183,13 @@ def check_angles(path: Path, robot: Robot, names: Sequence[str], angles: np.ndar
     Raises:
         DynacomError: they are far outside the joints' limits, and within if they are degrees.
     """
-    model = robot.model
-    joints = {name: model.joints[model.getJointId(name)] for name in names}
-    limited = [
-        column
-        for column, name in enumerate(names)
-        if joints[name].nq == 1 and is_revolute(joints[name])
-    ]
-    if not limited:
+    joints = robot.joints.take(names)
+    limited = np.flatnonzero(joints.turns & ~joints.unlimited)
+    if not len(limited):
         return []
-    indices = [joints[names[column]].idx_q for column in limited]
-    lower, upper = model.lowerPositionLimit[indices], model.upperPositionLimit[indices]
+    indices = joints.idx_q[limited]
+    lower = robot.model.lowerPositionLimit[indices]
+    upper = robot.model.upperPositionLimit[indices]
     angles = angles[:, limited]
 
     def excess(values: np.ndarray) -> np.ndarray:
@@ -198,6 +197,8 @@ def check_angles(path: Path, robot: Robot, names: Sequence[str], angles: np.ndar
 
     outside = excess(angles)
     frame, column = np.unravel_index(np.argmax(outside), outside.shape)
+    if outside[frame, column] <= NOTED_EXCESS:
+        return []
     name, value = names[limited[column]], angles[frame, column]
     limits = f"{lower[column]:.4g} to {upper[column]:.4g} rad"
     usual = np.median(outside, axis=0)
@@ -208,11 +209,9 @@ def check_angles(path: Path, robot: Robot, names: Sequence[str], angles: np.ndar
             f"{path}: joints must be in radians, got degrees: {name} ({limits}) is {value:.4g} in "
             f"frame {frame}"
         )
-    if outside[frame, column] > NOTED_EXCESS:
-        return [
-            f"The joint {name} ({limits}) goes beyond its limits: {value:.4g} rad in frame {frame}."
-        ]
-    return []
+    return [
+        f"The joint {name} ({limits}) goes beyond its limits: {value:.4g} rad in frame {frame}."
+    ]
 
 
 def check_jumps(path: Path, robot: Robot, time: np.ndarray, q: np.ndarray) -> None:
@@ -227,36 +226,31 @@ def check_jumps(path: Path, robot: Robot, time: np.ndarray, q: np.ndarray) -> No
     """
     if len(time) < 2:
         return
-    steps = np.diff(time)
-    # Clocks jitter; frames that come early have not moved faster.
-    steps = np.maximum(steps, np.median(steps))
-
     # Two quaternions, whatever their signs, are 2 sin(angle / 4) apart.
     first, second = q[:-1, 3:7], q[1:, 3:7]
-    sign = np.where((first * second).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    sign = np.where(np.einsum("ti,ti->t", first, second) < 0.0, -1.0, 1.0)[:, None]
     quarter = np.arcsin(np.minimum(0.5 * np.linalg.norm(sign * second - first, axis=1), 1.0))
-    names = joint_names(robot)
-    moved = [
-        np.linalg.norm(np.diff(q[:, :3], axis=0), axis=1),
-        4.0 * quarter,
-        *np.abs(np.diff(joint_angles(robot, q, names), axis=0)).T,
-    ]
-    limits, units = [LINEAR_SPEED, TURNING_SPEED], ["m", "rad"]
-    for index, name in enumerate(names, 2):
-        joint = robot.model.joints[robot.model.getJointId(name)]
-        turns = is_revolute(joint)
-        limits.append(JOINT_SPEED if turns else LINEAR_SPEED)
-        units.append("rad" if turns else "m")
-        if joint.nq == 2:
-            moved[index] = np.minimum(moved[index], 2.0 * np.pi - moved[index])
+    joints = robot.joints
+    angles = np.abs(np.diff(joint_angles(robot, q, joints.names), axis=0))
+    for column in np.flatnonzero(joints.unlimited):
+        angles[:, column] = np.minimum(angles[:, column], 2.0 * np.pi - angles[:, column])
+    moved = np.vstack([np.linalg.norm(np.diff(q[:, :3], axis=0), axis=1), 4.0 * quarter, angles.T])
+    limits = np.append(
+        [LINEAR_SPEED, TURNING_SPEED], np.where(joints.turns, JOINT_SPEED, LINEAR_SPEED)
+    )
 
-    speed = np.array(moved) / steps
-    excess = speed / np.array(limits)[:, None]
+    steps = np.diff(time)
+    if (moved / steps <= limits[:, None]).all():
+        return  # as nearly every motion does, which longer steps would not change
+    # Clocks jitter; frames that come early have not moved faster.
+    speed = moved / np.maximum(steps, np.median(steps))
+    excess = speed / limits[:, None]
     index, frame = np.unravel_index(np.argmax(excess), excess.shape)
     if excess[index, frame] > 1.0:
-        what, unit = ("the root", "the root's orientation", *names)[index], units[index]
+        what = ("the root", "the root's orientation", *joints.names)[index]
+        unit = "rad" if (False, True, *joints.turns)[index] else "m"
         raise DynacomError(
-            f"{path}: {what} jumps by {moved[index][frame]:.3g} {unit} between frame {frame} "
+            f"{path}: {what} jumps by {moved[index, frame]:.3g} {unit} between frame {frame} "
             f"({time[frame]:.6g} s) and the next: {speed[index, frame]:.3g} {unit}/s, expected at "
             f"most {limits[index]:g}"
         )

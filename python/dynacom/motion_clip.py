@@ -10,7 +10,7 @@ import numpy as np
 from dynacom.dynacom_pywrap import ContactPointSettings, ContactSchedule
 from dynacom.errors import DynacomError
 from dynacom.motion_checks import QUATERNION_NOTED, check_angles, check_jumps, normalize
-from dynacom.motion_joints import brief, configurations, joint_angles, joint_names
+from dynacom.motion_joints import brief, configurations, joint_angles
 from dynacom.robots import Robot
 
 
@@ -106,8 +106,8 @@ def clip_from_configurations(
     q[:, 3:7], error = normalize(path, q[:, 3:7], order, option)
     notes += check_angles(path, robot, names, joint_angles(robot, q, names))
     check_jumps(path, robot, time, q)
-    known = joint_names(robot)
-    if held := [name for name in known if name not in names]:
+    known, there = robot.joints.names, set(names)
+    if held := [name for name in known if name not in there]:
         notes.append(
             f"The file does not give {len(held)} of {len(known)} joints, which stay at their "
             f"default: {brief(held)}."
@@ -117,7 +117,7 @@ def clip_from_configurations(
             f"The root's quaternions were normalised: their norms differ from 1 by up to "
             f"{error.max():.1g}."
         )
-    given = tuple(name for name in known if name in names)
+    given = tuple(name for name in known if name in there)
     return Clip(path, time, q, v, a, given, schedule, forces or {}, error, tuple(notes))
 
 

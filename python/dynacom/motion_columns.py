@@ -34,7 +34,7 @@ def clip_from_columns(
     options: Options,
     *,
     order: str | None = None,
-    labels: Mapping[str, str] | None = None,
+    numbered: bool = False,
     notes: Sequence[str] = (),
 ) -> Clip:
     """A clip of columns of numbers by name, each (T,).
@@ -42,13 +42,13 @@ def clip_from_columns(
     Args:
         order: of the quaternions, where the file does not name their columns; columns are already
             named accordingly.
-        labels: what messages call columns instead of by their names.
+        numbered: whether messages give the columns' numbers, because the file does not name them.
 
     Raises:
         DynacomError: as :func:`read_motion`.
     """
     root = [_find_root(path, columns, name) for name in ROOT_COLUMNS]
-    table = _Table(path, columns, labels or {}, len(columns[root[0]]))
+    table = _Table(path, columns, numbered, len(columns[root[0]]))
     contacts = [name for name in columns if _CONTACT.fullmatch(name)]
     times = [name for name in _TIME_COLUMNS if name in columns]
     others = {*root, *contacts, *times, *_IGNORED_COLUMNS}
@@ -85,17 +85,19 @@ def clip_from_columns(
 class _Table:
     path: Path
     columns: Mapping[str, np.ndarray]
-    labels: Mapping[str, str]
+    numbered: bool
     frames: int
 
     def label(self, name: str) -> str:
-        return self.labels.get(name, f"column '{name}'")
+        if self.numbered:
+            return f"column {[*self.columns].index(name) + 1} ({name})"
+        return f"column '{name}'"
 
     def take(self, names: Sequence[str]) -> np.ndarray:
         """Columns of finite numbers, (T, k)."""
         values = np.array([self.columns[name] for name in names], dtype=float)
         values = values.reshape(len(names), self.frames).T  # if there is none, too
-        check_finite(self.path, [self.label(name) for name in names], values)
+        check_finite(self.path, lambda column: self.label(names[column]), values)
         return values
 
 

@@ -60,12 +60,12 @@ def read_motion(
     path = Path(path)
     if quat not in (None, "xyzw", "wxyz"):
         raise DynacomError(f"quat must be xyzw or wxyz, got '{quat}'")
-    if path.is_dir():
-        raise DynacomError(f"{path}: cannot be read (Is a directory)")
     suffix = path.suffix.lower()
     if suffix == ".gz":
         suffix = "".join(path.suffixes[-2:]).lower()
     if suffix not in _READERS:
+        if path.is_dir():
+            raise DynacomError(f"{path}: cannot be read (Is a directory)")
         raise DynacomError(f"{path}: must end in one of {', '.join(_READERS)}, got '{path.name}'")
     try:
         with np.errstate(all="ignore"):  # what overflows is refused

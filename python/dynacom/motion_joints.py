@@ -2,12 +2,12 @@
 """Joints of motion files and of robots: names, orders, angles."""
 
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from dynacom.errors import DynacomError
 from dynacom.robots import Robot
@@ -16,23 +16,10 @@ from dynacom.robots import Robot
 ROOT_JOINT = 1
 
 
-def joint_names(robot: Robot) -> tuple[str, ...]:
-    """The joints that a file can give a number of, in the model's order.
-
-    All but the free-flyer and what else has several degrees of freedom.
-    """
-    model = robot.model
-    return tuple(
-        name
-        for index, name in enumerate(model.names)
-        if index > ROOT_JOINT and model.joints[index].nv == 1
-    )
-
-
 def urdf_order(robot: Robot) -> tuple[str, ...]:
-    """:func:`joint_names` in the order of the URDF's text, which the model's need not be."""
+    """The robot's joints in the order of the URDF's text, which the model's need not be."""
     place = {name: index for index, name in enumerate(_names_in_urdf(robot.urdf))}
-    return tuple(sorted(joint_names(robot), key=lambda name: place.get(name, len(place))))
+    return tuple(sorted(robot.joints.names, key=lambda name: place.get(name, len(place))))
 
 
 def _names_in_urdf(path: Path) -> tuple[str, ...]:
@@ -50,7 +37,7 @@ def _read_names(path: Path, changed: int) -> tuple[str, ...]:
 
 
 def tree_orders(robot: Robot) -> dict[str, tuple[str, ...]]:
-    """:func:`joint_names` as simulators order them: what it is called -> the names.
+    """The robot's joints as simulators order them: what it is called -> the names.
 
     Siblings stand in the order of the URDF; fixed joints make no level of their own.
     """
@@ -82,7 +69,7 @@ def tree_orders(robot: Robot) -> dict[str, tuple[str, ...]]:
 
 def joint_counts(robot: Robot) -> set[int]:
     """How many joints a file without names may have."""
-    return {len(joint_names(robot)), *map(len, robot.joint_layouts)}
+    return {len(robot.joints.names), *map(len, robot.joint_layouts)}
 
 
 def order_without_names(path: Path, robot: Robot, count: int) -> tuple[tuple[str, ...], list[str]]:
@@ -121,12 +108,13 @@ def match_joints(path: Path, robot: Robot, names: Sequence[str]) -> tuple[list[i
         DynacomError: a name is there twice; or some are not the robot's while the robot has joints
             that are not named: it is another robot's clip.
     """
-    known = joint_names(robot)
-    for name in names:
-        if names.count(name) > 1:
-            raise DynacomError(f"{path}: joint '{name}' is there {names.count(name)} times")
+    known = robot.joints.places
+    counts = Counter(names)
+    for name, count in counts.items():
+        if count > 1:
+            raise DynacomError(f"{path}: joint '{name}' is there {count} times")
     unknown = [name for name in names if name not in known]
-    missing = [name for name in known if name not in names]
+    missing = [name for name in known if name not in counts]
     if missing and (unknown or len(missing) == len(known)):
         raise DynacomError(
             f"{path}: must have the joints of {robot.name}, got {brief(unknown) or 'none'}, "
@@ -160,32 +148,22 @@ def configurations(
     q = np.tile(robot.default, (len(position), 1))
     q[:, :3] = position
     q[:, 3:7] = quaternion
-    for name, angle in zip(names, angles.T, strict=True):
-        joint = robot.model.joints[robot.model.getJointId(name)]
-        if joint.nq == 2:  # without limits: cosine and sine
-            q[:, joint.idx_q] = np.cos(angle)
-            q[:, joint.idx_q + 1] = np.sin(angle)
-        else:
-            q[:, joint.idx_q] = angle
+    joints = robot.joints.take(names)
+    q[:, joints.idx_q] = angles
+    for column in np.flatnonzero(joints.unlimited):
+        index, angle = joints.idx_q[column], angles[:, column]
+        q[:, index], q[:, index + 1] = np.cos(angle), np.sin(angle)
     return q
 
 
 def joint_angles(robot: Robot, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
     """The inverse of :func:`configurations`: (T, k)."""
-    angles = np.empty((len(q), len(names)))
-    for column, name in enumerate(names):
-        joint = robot.model.joints[robot.model.getJointId(name)]
-        angles[:, column] = (
-            np.arctan2(q[:, joint.idx_q + 1], q[:, joint.idx_q])
-            if joint.nq == 2
-            else q[:, joint.idx_q]
-        )
+    joints = robot.joints.take(names)
+    angles = q[:, joints.idx_q]
+    for column in np.flatnonzero(joints.unlimited):
+        index = joints.idx_q[column]
+        angles[:, column] = np.arctan2(q[:, index + 1], q[:, index])
     return angles
-
-
-def is_revolute(joint: pin.JointModel) -> bool:
-    """Whether a joint of one degree of freedom turns."""
-    return joint.shortname().startswith("JointModelR")
 
 
 def rotations(quaternion: np.ndarray) -> np.ndarray:

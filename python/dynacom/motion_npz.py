@@ -35,7 +35,6 @@ from dynacom.motion_clip import (
 )
 from dynacom.motion_joints import (
     joint_counts,
-    joint_names,
     match_joints,
     order_without_names,
     rotations,
@@ -164,7 +163,7 @@ def _read_plain(path: Path, robot: Robot, arrays: _Arrays, options: Options) -> 
         robot,
         time,
         q,
-        names=joint_names(robot),
+        names=robot.joints.names,
         order="xyzw",
         notes=notes,
         v=v,

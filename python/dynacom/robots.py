@@ -33,6 +33,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -88,6 +89,31 @@ class RobotFile:
         return self.path.stem
 
 
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """Joints of one degree of freedom, of which a motion's file can give a number."""
+
+    names: tuple[str, ...]
+    #: (n,) Where they begin in a configuration.
+    idx_q: np.ndarray
+    #: (n,) Whether they turn; the others slide.
+    turns: np.ndarray
+    #: (n,) Whether they have no limits: in a configuration they are a cosine and a sine.
+    unlimited: np.ndarray
+
+    @cached_property
+    def places(self) -> Mapping[str, int]:
+        """Name -> its place among the names."""
+        return {name: place for place, name in enumerate(self.names)}
+
+    def take(self, names: Sequence[str]) -> "Joints":
+        """Some of them, in another order."""
+        if tuple(names) == self.names:
+            return self
+        places = [self.places[name] for name in names]
+        return Joints(tuple(names), self.idx_q[places], self.turns[places], self.unlimited[places])
+
+
 @dataclass(frozen=True)
 class Robot:
     """A model and the settings of its contacts."""
@@ -104,6 +130,23 @@ class Robot:
     #: Names of joints, in their order, of the robot's smaller versions: for motions that have fewer
     #: joints than the robot, and no names. No two are equally long.
     joint_layouts: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
+
+    @cached_property
+    def joints(self) -> Joints:
+        """All but the free-flyer and what else has several degrees of freedom.
+
+        They stand in the model's order.
+        """
+        model = self.model
+        # Behind the universe and the free-flyer.
+        found = [index for index in range(2, model.njoints) if model.nvs[index] == 1]
+        joints = [model.joints[index] for index in found]
+        return Joints(
+            tuple(model.names[index] for index in found),
+            np.array([joint.idx_q for joint in joints], dtype=int),
+            np.array([joint.shortname().startswith("JointModelR") for joint in joints], dtype=bool),
+            np.array([joint.nq == 2 for joint in joints], dtype=bool),
+        )
 
     def dynacom(self, inactive: Iterable[str] = ()) -> DynaCoM:
         """A new DynaCoM of this robot, which knows all its contacts.

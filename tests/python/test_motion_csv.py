@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-2-Clause
 import gzip
+import sys
 
 import numpy as np
 import pytest
@@ -7,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dynacom import read_motion
-from helpers import CALM
+from dynacom import DynacomError, read_motion
+from helpers import CALM, THOROUGH
 from motion_files import ROOT, assert_notes, refuses, sway, write_columns, write_csv
 
 FORCES = [f"contact.pad.{what}_{axis}" for what in ("force", "torque") for axis in "xyz"]
@@ -315,6 +316,190 @@ def test_other_files(tmp_path, toy, content):
     path = tmp_path / "clip.csv"
     path.write_bytes(content)
     refuses(path, toy)
+
+
+# With Arrow and without.
+
+
+def outcome(path, robot):
+    """The clip, to the bit, or the message."""
+    try:
+        clip = read_motion(path, robot, fps=60)
+    except DynacomError as error:
+        return str(error)
+    arrays = [clip.time, clip.q, clip.quaternion_error, *clip.forces.values()]
+    active = None if clip.schedule is None else clip.schedule.active.tolist()
+    return [(a.shape, a.tobytes()) for a in arrays], clip.joint_names, clip.notes, active
+
+
+def outcomes(path, robot):
+    """With and without Arrow."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "pyarrow", None)
+        without = outcome(path, robot)
+    return outcome(path, robot), without
+
+
+def to_lines(table):
+    return [",".join(map(repr, map(float, row))) for row in table]
+
+
+@pytest.fixture
+def no_numpy(monkeypatch):
+    """Makes what Arrow does not read an error."""
+
+    def fail(*_, **__):
+        raise AssertionError("not read by Arrow")
+
+    monkeypatch.setattr(np, "loadtxt", fail)
+
+
+PLAIN = {
+    "lines": lambda lines: "\n".join(lines),
+    "last line ended": lambda lines: "\n".join(lines) + "\n",
+    "of Windows": lambda lines: "\r\n".join(lines) + "\r\n",
+    "of old Macs": lambda lines: "\r".join(lines) + "\r",
+    "blank lines": lambda lines: "\n \n\n" + "\n\n".join(lines) + "\n\n\n",
+    "mark": lambda lines: "\ufeff" + "\n".join(lines),
+    "spaces": lambda lines: "\n".join(line.replace(",", " ,\t ") for line in lines),
+    "comment sign": lambda lines: "\n".join(["# " + lines[0], *lines[1:]]),
+    "quoted names": lambda lines: "\n".join(['"' + lines[0].replace(",", '","') + '"', *lines[1:]]),
+}
+ODD = {
+    "quotes": lambda lines: "\n".join([lines[0], lines[1].replace(",", '","'), *lines[2:]]),
+    "spaces between": lambda lines: "\n".join([*lines[:3], "   ", *lines[3:]]),
+    "comment": lambda lines: "\n".join([*lines[:3], "# the end"]),
+    "comma at the end": lambda lines: "\n".join(line + "," for line in lines),
+    "mark below": lambda lines: "\n".join([lines[0], "\ufeff" + lines[1], *lines[2:]]),
+    "two marks": lambda lines: "\ufeff\ufeff" + "\n".join(lines),
+    "short line": lambda lines: "\n".join([*lines, "1,2"]),
+    "semicolons": lambda lines: "\n".join(lines).replace(",", ";"),
+    "decimal commas": lambda lines: "\n".join(lines).replace(",", ";").replace(".", ","),
+    "no row": lambda lines: lines[0] + "\n\n",
+}
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".csv.gz"])
+@pytest.mark.parametrize("header", [True, False])
+@pytest.mark.parametrize("name", [*PLAIN, *ODD])
+def test_texts_with_and_without_arrow(tmp_path, toy, text, name, header, suffix):
+    lines = text if header else [row.partition(",")[2] for row in text[1:]]
+    content = (PLAIN | ODD)[name](lines).encode()
+    path = tmp_path / f"clip{suffix}"
+    path.write_bytes(gzip.compress(content) if suffix == ".csv.gz" else content)
+    with_arrow, without = outcomes(path, toy)
+    assert with_arrow == without
+    if name in PLAIN and (header or name not in ("comment sign", "quoted names")):
+        assert not isinstance(without, str)
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_arrow_reads_plain_texts(tmp_path, toy, text, name, no_numpy):
+    path = tmp_path / "clip.csv"
+    path.write_text(PLAIN[name](text), encoding="utf-8", newline="")
+    np.testing.assert_allclose(read_motion(path, toy).q, sway(toy, 5).q, atol=1e-15)
+
+
+CELLS = [
+    *("", " ", "NA", "N/A", "null", "None", "nan", "NaN", "-nan", "nan(1)", "#N/A", "NULL"),
+    *("inf", "-inf", "Infinity", "+INFINITY", "1e400", "-1e400", "1.#INF", "1e308", "1e-400"),
+    *("+0.5", "++0.5", "+-0.5", "--0.5", "- 0.5", ".5", "5.", ".", "1e", "1e5", "1E+05", "1e+-5"),
+    *("0x1", "0x1p-3", "1_0", "1d0", "1f", "1L", "1j", "0.5%", "1 000", "1'000", "0b1", "007.50"),
+    *("4.9e-324", "2.2250738585072011e-308", "9007199254740993", "0.1000000000000000055511151231"),
+    *('"0.5"', '"0"5', '"0""5"', '""0.5', '"0.5" ', "'0.5'", '"0.5', '0"5', "#", "0.5#", "# 0.5"),
+    *("True", "false", "1\x00", "1\x1a", "\t0.5\t", "\xa00.5", "\u20030.5", "0.5\x0b", "0.5\x0c"),
+    *("\x1c0.5", "\ufeff0.5", "\u0661", "\u22121"),
+]
+
+
+@pytest.mark.parametrize(
+    "column", ["battery", "contact.pad.force_z", "contact.pad.active", "m_hip"]
+)
+@pytest.mark.parametrize("cell", CELLS)
+def test_cells_with_and_without_arrow(tmp_path, toy, cell, column):
+    columns = sway(toy, 5).columns | {name: np.arange(5.0) for name in FORCES[:3]}
+    columns |= {"contact.pad.active": np.ones(5), "battery": np.zeros(5)}
+    header, *rows = [",".join(columns), *to_lines(np.column_stack([*columns.values()]))]
+    cells = rows[2].split(",")
+    cells[[*columns].index(column)] = cell
+    path = tmp_path / "clip.csv"
+    path.write_text("\n".join([header, *rows[:2], ",".join(cells), *rows[3:]]), encoding="utf-8")
+    with_arrow, without = outcomes(path, toy)
+    assert with_arrow == without
+
+
+@pytest.mark.parametrize("position", [0, 5, 8190, 8192, 100_000, -1])
+@pytest.mark.parametrize("part", [b"\xff", b"\xc3\xa9", b"\x00", b"\r", b",", b"\n"])
+def test_bytes_with_and_without_arrow(tmp_path, toy, part, position):
+    """Whatever stands where."""
+    content = "\n".join(to_lines(sway(toy, 600).table)).encode()
+    path = tmp_path / "clip.csv"
+    path.write_bytes(content[:position] + part + content[position:])
+    with_arrow, without = outcomes(path, toy)
+    assert with_arrow == without
+
+
+@pytest.mark.parametrize("length", [0, 1, 9, 12, 2000, -9, -4])
+@pytest.mark.parametrize("more", [[], ["1,2"]])
+def test_cut_archives_with_and_without_arrow(tmp_path, toy, more, length):
+    """What is wrong first counts."""
+    first, *rows = to_lines(sway(toy).table)
+    path = tmp_path / "clip.csv.gz"
+    path.write_bytes(gzip.compress("\n".join([first, *more, *rows]).encode())[:length])
+    with_arrow, without = outcomes(path, toy)
+    assert with_arrow == without
+    assert isinstance(without, str)
+
+
+def test_long_files(tmp_path, toy, no_numpy):
+    """Which Arrow reads in blocks of a megabyte."""
+    motion = sway(toy, 20_000)
+    path = write_csv(tmp_path / "clip.csv", motion.table)
+    assert path.stat().st_size > 3 << 20
+    clip = read_motion(path, toy, fps=60)
+    np.testing.assert_allclose(clip.q, motion.q, atol=1e-12)
+    np.testing.assert_array_equal(clip.q[:, :3], motion.position)
+    # A row that is wrong far below is found, too.
+    with path.open("a") as file:
+        file.write("1,2\n")
+    with pytest.raises(AssertionError, match="not read by Arrow"):
+        read_motion(path, toy, fps=60)
+
+
+def test_errors_of_long_files(tmp_path, toy):
+    path = write_csv(tmp_path / "clip.csv", sway(toy, 8_000).table)
+    with path.open("a") as file:
+        file.write("1,2\n")
+    refuses(path, toy, "line 8001 must have 12 columns, as the first, got 2", fps=60)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@THOROUGH
+@given(
+    cells=st.lists(
+        st.one_of(
+            st.floats(width=64).map(repr),
+            st.floats(allow_nan=False, allow_infinity=False).map("{:.25e}".format),
+            st.decimals(-10, 10, places=30).map(str),
+            st.from_regex(r"[ \t]?[-+]?[0-9]{1,25}(\.[0-9]{0,25})?([eE][-+]?[0-9]{1,3})?[ \t]?\Z"),
+            st.text("0123456789+-.eExnaif_\"'# \t,", max_size=6),
+            st.sampled_from(CELLS),
+        ),
+        min_size=1,
+        max_size=4,
+    ),
+    end=st.sampled_from(["\n", "\r\n", "\r", "\n\n", " \n"]),
+)
+def test_any_cells_with_and_without_arrow(tmp_path_factory, toy, cells, end):
+    """Forces may be any numbers, and are handed out as they are."""
+    columns = sway(toy, len(cells)).columns | {name: np.zeros(len(cells)) for name in FORCES[:2]}
+    rows = to_lines(np.column_stack([*columns.values()]))
+    lines = [",".join([*columns, FORCES[2]])]
+    lines += [f"{row},{cell}" for row, cell in zip(rows, cells, strict=True)]
+    path = tmp_path_factory.mktemp("cells") / "clip.csv"
+    path.write_text(end.join(lines), encoding="utf-8", newline="")
+    with_arrow, without = outcomes(path, toy)
+    assert with_arrow == without
 
 
 @CALM

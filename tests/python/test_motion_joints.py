@@ -11,7 +11,6 @@ from dynacom.motion_joints import (
     brief,
     configurations,
     joint_angles,
-    joint_names,
     match_joints,
     order_without_names,
     rotations,
@@ -24,7 +23,7 @@ PATH = Path("clip.csv")
 
 
 def test_orders_of_a_robot_whose_joints_stand_anyhow(toy):
-    assert joint_names(toy) == ("a_slide", "c_wheel", "m_hip", "z_knee", "b_toe")
+    assert toy.joints.names == ("a_slide", "c_wheel", "m_hip", "z_knee", "b_toe")
     assert urdf_order(toy) == ("z_knee", "m_hip", "c_wheel", "a_slide", "b_toe")
     assert tree_orders(toy) == {
         "the order of the URDF": ("z_knee", "m_hip", "c_wheel", "a_slide", "b_toe"),
@@ -36,7 +35,7 @@ def test_orders_of_a_robot_whose_joints_stand_anyhow(toy):
 def test_orders_of_the_g1(humanoid):
     names = urdf_order(humanoid)
     assert len(names) == 29
-    assert names == joint_names(humanoid)
+    assert names == humanoid.joints.names
     orders = tree_orders(humanoid)
     assert orders["depth first"] == names
     # As Isaac Lab has it.
@@ -58,8 +57,8 @@ def test_orders_of_the_g1(humanoid):
 def test_the_model_of_talos_is_not_in_the_order_of_its_urdf():
     talos = load_robot("talos")
     assert urdf_order(talos)[0] == "torso_1_joint"
-    assert joint_names(talos)[0] == "leg_left_1_joint"
-    assert sorted(urdf_order(talos)) == sorted(joint_names(talos))
+    assert talos.joints.names[0] == "leg_left_1_joint"
+    assert sorted(urdf_order(talos)) == sorted(talos.joints.names)
 
 
 def test_urdf_is_gone(toy, tmp_path):

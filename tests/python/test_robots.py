@@ -3,6 +3,7 @@ import copy
 import re
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -426,6 +427,41 @@ def test_anymal_touches_below_the_ball_however_the_leg_points(anymal):
         surface = dynamics.getContact(name).getSurfacePose()
         np.testing.assert_allclose(surface.translation, ball - [0.0, 0.0, 0.03], atol=1e-12)
         np.testing.assert_allclose(surface.rotation, np.eye(3), atol=1e-12)
+
+
+# Robot.joints.
+
+
+def test_joints(toy):
+    joints = toy.joints
+    assert joints.names == ("a_slide", "c_wheel", "m_hip", "z_knee", "b_toe")
+    np.testing.assert_array_equal(joints.idx_q, [7, 8, 10, 11, 12])
+    np.testing.assert_array_equal(joints.turns, [False, True, True, True, True])
+    np.testing.assert_array_equal(joints.unlimited, [False, True, False, False, False])
+
+
+@pytest.mark.parametrize(
+    "names", [(), ("z_knee",), ("c_wheel", "b_toe", "a_slide"), ("m_hip", "a_slide", "c_wheel")]
+)
+def test_some_joints(toy, names):
+    some = toy.joints.take([*names])
+    assert some.names == names
+    model = toy.model
+    joints = [model.joints[model.getJointId(name)] for name in names]
+    np.testing.assert_array_equal(some.idx_q, [joint.idx_q for joint in joints])
+    np.testing.assert_array_equal(some.turns, [name != "a_slide" for name in names])
+    np.testing.assert_array_equal(some.unlimited, [name == "c_wheel" for name in names])
+
+
+def test_all_joints_as_they_stand(toy):
+    assert toy.joints.take([*toy.joints.names]) is toy.joints
+
+
+def test_robots_do_not_share_joints(talos, anymal):
+    """Not even those that were made of one another."""
+    assert talos.joints.names != anymal.joints.names
+    other = replace(talos, model=anymal.model)
+    assert other.joints.names == anymal.joints.names
 
 
 # Robot.dynacom().
