@@ -2,6 +2,7 @@
 """Many motions at once: a row per clip, whatever the clip."""
 
 import os
+import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -149,6 +150,8 @@ def run_batch(
     from dynacom.batch_store import Store
 
     out = Path(out)
+    if re.match(r"[a-z][a-z0-9+.-]+:/", str(out), re.IGNORECASE):  # a Path has one slash
+        raise DynacomError(f"out must be a folder of this machine, got {out}")
     _check(engine, jobs, shard, quat, report)
     if report:
         check_reports()

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """The files of a batch: which they are, and where they are while they are read."""
 
+import errno
 import glob
 import os
 import re
 import stat
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,15 @@ from dynacom.errors import DynacomError
 from dynacom.motion_file import SUFFIXES
 
 _URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
+# What the commonest URLs need, by their beginning.
+_PACKAGES = {
+    "abfs": "adlfs",
+    "az": "adlfs",
+    "gs": "gcsfs",
+    "http": "fsspec aiohttp",
+    "https": "fsspec aiohttp",
+    "s3": "s3fs",
+}
 # What a batch writes to its folder, which may be that of the motions.
 _RESULTS = ("clips.parquet", "parts", "frames", "reports")
 
@@ -26,15 +36,15 @@ def find_motions(
 
     Folders are searched for files whose suffix is that of a motion, but for what is hidden, and for
     what a batch writes to `out`. A glob stands for what it matches. URLs, of what fsspec opens, may
-    be both.
+    be all of these.
 
     Returns:
         A file's name in results, where it is text whatever its bytes -> the file. Files that are
         not there are among them, if they are called like a motion.
 
     Raises:
-        DynacomError: a path is none of a motion, or a folder holds none; fsspec is needed and not
-            installed.
+        DynacomError: a path is none of a motion, or a folder holds none; a URL cannot be searched,
+            or fsspec or what it needs for it is not installed.
     """
     if isinstance(paths, str | Path):
         paths = [paths]
@@ -65,8 +75,8 @@ def local_copy(file: str) -> Iterator[Path]:
     """The file itself, or a copy of what a URL stands for while it is needed.
 
     Raises:
-        DynacomError: it is no regular file, which would never end; fsspec is not installed.
-        OSError: it cannot be read.
+        DynacomError: it is no regular file, which would never end; it is a URL that cannot be read.
+        OSError: it is not there.
     """
     if not is_url(file):
         if not stat.S_ISREG(os.stat(file).st_mode):
@@ -74,9 +84,11 @@ def local_copy(file: str) -> Iterator[Path]:
         yield Path(file)
         return
     with tempfile.TemporaryDirectory(prefix="dynacom-") as folder:
-        copy = Path(folder, file.rstrip("/").rpartition("/")[2])
-        system, path = _fsspec(file).url_to_fs(file)
-        system.get_file(path, str(copy))
+        with _remote(file, "read") as (system, path):
+            name = _without_query(path).rpartition("/")[2]
+            # The end says what it is; a disk's names are shorter than those of servers.
+            copy = Path(folder, name.encode()[-200:].decode(errors="ignore"))
+            system.get_file(path, str(copy))
         yield copy
 
 
@@ -108,23 +120,72 @@ def _search(folder: str, out: Path | None) -> Iterator[str]:
 
 
 def _find_remote(url: str) -> Iterator[str]:
-    system, path = _fsspec(url).url_to_fs(url)
-    is_glob = glob.has_magic(path)
-    for match in system.glob(path) if is_glob else [path]:
-        if not system.isdir(match):
-            if not is_glob or match.lower().endswith(SUFFIXES):
-                yield system.unstrip_protocol(match)
-            continue
-        for file in system.find(match):
-            inside = file[len(match) :].split("/")
-            is_hidden = any(part.startswith(".") for part in inside)
-            if file.lower().endswith(SUFFIXES) and not is_hidden:
-                yield system.unstrip_protocol(file)
+    with _remote(url, "searched") as (system, path):
+        system.invalidate_cache()  # there may be more than at the last search of this process
+        address = _addresses(url, path, system)
+        name = _without_query(path)
+        is_named = name.lower().endswith(SUFFIXES)
+        is_folder = url.endswith("/")
+        # Asked first: who may read a file may not always list its folder.
+        if is_named and not is_folder and system.isfile(path):
+            yield address(path)
+        elif glob.has_magic(name):
+            for match, info in system.glob(path, detail=True).items():
+                if "/." in match and "/." not in name:
+                    continue  # hidden
+                if info["type"] == "directory":
+                    yield from map(address, _search_remote(system, match.rstrip("/")))
+                elif match.lower().endswith(SUFFIXES):
+                    yield address(match)
+        elif is_folder or system.isdir(path):
+            yield from map(address, _search_remote(system, path))
+        elif is_named or system.exists(path):
+            yield address(path)
+        else:
+            raise DynacomError(f"{url}: must be a file or a folder, which is not there")
 
 
-def _fsspec(url: str) -> Any:
+def _search_remote(system: Any, folder: str) -> Iterator[str]:
+    for file in system.find(folder):
+        inside = file[len(folder) :].split("/")
+        is_hidden = any(part.startswith(".") for part in inside)
+        if file.lower().endswith(SUFFIXES) and not is_hidden:
+            yield file
+
+
+@contextmanager
+def _remote(url: str, what: str) -> Iterator[tuple[Any, str]]:
+    """fsspec's file system and path; whatever either raises becomes a DynacomError."""
     try:
         import fsspec.core
+
+        yield fsspec.core.url_to_fs(url)
+    except DynacomError:
+        raise
     except ImportError as error:
-        raise DynacomError(f"{url}: URLs need fsspec: pip install fsspec") from error
-    return fsspec.core
+        kinds = [kind for kind in re.findall(r"(\w+)://", url) if kind in _PACKAGES]
+        package = _PACKAGES[kinds[-1]] if kinds else error.name
+        hint = f": pip install {package}" if package else ""
+        raise DynacomError(f"{url}: needs a package ({error}){hint}") from error
+    except Exception as error:  # of any server's library
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        if isinstance(error, FileNotFoundError) and reason in ("", url):
+            reason = os.strerror(errno.ENOENT)
+        reason = reason or type(error).__name__
+        raise DynacomError(f"{url}: cannot be {what} ({reason})") from error
+
+
+def _addresses(url: str, path: str, system: Any) -> Callable[[str], str]:
+    """What makes a URL of a path, as url is one of path: with its server, or what is around it."""
+    # zip://folder::s3://bucket/archive.zip
+    head, chain = re.fullmatch(r"(.*?://.*?)((?:::.*)?)", url, re.DOTALL).groups()
+    start = head.rfind(path)
+    if start < 0 or head[start + len(path) :].strip("/"):
+        return system.unstrip_protocol
+    return lambda found: f"{head[:start]}{found}{chain}"
+
+
+def _without_query(path: str) -> str:
+    """Of HTTP, where ? does not belong to a file's name."""
+    is_http = path.lower().startswith(("http://", "https://"))
+    return path.partition("?")[0] if is_http else path

@@ -234,21 +234,6 @@ def test_paths(tmp_path, monkeypatch):
         find_motions([])
 
 
-def test_urls(tmp_path):
-    pytest.importorskip("fsspec")
-    cut(tmp_path / "walk.npz", 0, 20)
-    (tmp_path / "bad.csv").write_text("x\n")
-    (tmp_path / "notes.md").touch()
-    for path in (f"file://{tmp_path}", f"file://{tmp_path}/*"):
-        found = find_motions(path)
-        assert [name.rpartition("/")[2] for name in found][:2] == ["bad.csv", "walk.npz"]
-    table = dynacom.batch(f"file://{tmp_path}", ROBOT)
-    bad, walk = table.to_pylist()
-    assert walk["status"] == "ok"
-    assert walk["file"] == f"file://{tmp_path}/walk.npz"
-    assert bad["error"].startswith(f"file://{tmp_path}/bad.csv: missing column")
-
-
 # Frames.
 
 
@@ -658,6 +643,7 @@ def test_bad_arguments(walks, tmp_path, monkeypatch):
     refused("shard must be i/n with i from 1 to n, got 3/2", walks, ROBOT, shard=(3, 2))
     refused("got 0/2", walks, ROBOT, shard=(0, 2))
     refused("report must not be negative", walks, ROBOT, report=-1, out=tmp_path / "out")
+    refused("out must be a folder of this machine", walks, ROBOT, out="s3://bucket/out")
     for name in ("resume", "frames", "report"):
         refused(f"{name} needs out", walks, ROBOT, **{name: 1})
     monkeypatch.setitem(sys.modules, "pyarrow", None)
