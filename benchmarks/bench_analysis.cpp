@@ -174,7 +174,7 @@ std::vector<Case> makeCases() {
   addClip(cases, "sway", [] { return makeSway(kFrames); });
   if (std::ifstream(DYNACOM_DANCE)) addClip(cases, "dance", readDance);
   const MakeClip makeLong = [] { return makeSway(kManyFrames); };
-  const int lanes = AnalysisSettings::kMaximalLanes;
+  const int lanes = kMaximalLanes;
   const std::string one = "analyzeMotion/1 thread", two = "analyzeMotion/2 threads";
   cases.push_back(analysis(one, makeLong, makeSettings(1, lanes), ""));
   cases.push_back(analysis(two, makeLong, makeSettings(2, lanes), one));

@@ -31,10 +31,10 @@ std::string writeContactMotion(const ContactMotion& contact) {
                           ")");
 }
 
-bp::list listContactMotions(const DynaCoM& robot, const Motion& motion, int threads) {
+bp::list listContactMotions(const DynaCoM& robot, const Motion& motion, int threads, int lanes) {
   const auto compute = [&, own_robot = DynaCoM(robot)] {
     const WithoutLock without_lock;
-    return computeContactMotions(own_robot, motion, threads);
+    return computeContactMotions(own_robot, motion, threads, lanes);
   };
   return toList(compute());
 }
@@ -105,9 +105,10 @@ void exposeContactSchedule() {
       .def(SettingsVisitor<Settings>());
 
   bp::def("computeContactMotions", &listContactMotions,
-          (bp::arg("robot"), bp::arg("motion"), bp::arg("threads") = 0),
-          "A ContactMotion for each contact that a robot knows, in its order; threads as in\n"
-          "analyzeMotion. Raises ValueError if the motion is not valid.");
+          (bp::arg("robot"), bp::arg("motion"), bp::arg("threads") = 0,
+           bp::arg("lanes") = kMaximalLanes),
+          "A ContactMotion for each contact that a robot knows, in its order; threads and lanes\n"
+          "as in analyzeMotion. Raises ValueError if the motion is not valid.");
   bp::def("estimateGround", &estimate,
           (bp::arg("contacts"), bp::arg("time"), bp::arg("settings") = DetectionSettings()),
           "The height of the ground under each of C contacts, (C,) [m]: the fifth percentile of\n"

@@ -56,7 +56,7 @@ void exposeMotionAnalysis() {
       (bp::arg("robot"), bp::arg("motion"), bp::arg("schedule"),
        bp::arg("flatHorizontalGround") = true, bp::arg("omega") = 0.,
        bp::arg("progress") = bp::object(), bp::arg("threads") = 0,
-       bp::arg("lanes") = AnalysisSettings::kMaximalLanes),
+       bp::arg("lanes") = kMaximalLanes),
       "Computes dynamics and distribution for every frame of a motion, whose contacts are placed\n"
       "by the model: a pose that was measured once says nothing of them. The robot, a DynaCoM, is\n"
       "left as it is; contacts without schedule are never active.\n\n"
@@ -70,8 +70,7 @@ void exposeMotionAnalysis() {
       "motion\n"
       "or schedule is not valid, or names a contact that the robot does not know.");
   bp::def(
-      "countLanes", &countLanes,
-      (bp::arg("robot"), bp::arg("lanes") = AnalysisSettings::kMaximalLanes),
+      "countLanes", &countLanes, (bp::arg("robot"), bp::arg("lanes") = kMaximalLanes),
       "How many lanes of SIMD registers this machine has for a robot, and no more than so many:\n"
       "8 with AVX-512, 4 with AVX2, 1 where there is neither, or the robot has joints or\n"
       "contacts that lanes do not know.");

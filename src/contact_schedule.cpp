@@ -91,7 +91,9 @@ void cutToRest(const Eigen::VectorXd& speed, double rest_speed,
 // hang on.
 class ContactPlacer {
  public:
-  explicit ContactPlacer(const DynaCoM& robot) : model_(robot.getModel()) {
+  explicit ContactPlacer(const internal::Desks& desks) : model_(desks.robot().getModel()) {
+    const DynaCoM& robot = desks.robot();
+    if (desks.laneRobot()) lanes_.emplace(*desks.laneRobot(), robot.getGroundHeight(), true);
     std::vector<bool> carries(static_cast<std::size_t>(model_.njoints), false);
     for (const std::string& name : robot.getKnownContacts()) {
       const auto contact = robot.getContact(name)->clone();
@@ -105,28 +107,20 @@ class ContactPlacer {
       if (carries[joint]) joints_.push_back({joint, model_.joints[joint].createData()});
   }
 
-  void place(const Motion& motion, Eigen::Index frame, std::vector<ContactMotion>& contacts) {
-    q_ = motion.q.col(frame);
-    v_ = motion.v.col(frame);
-    moveJoints();
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      const auto& [contact, contact_frame, corners] = contacts_[k];
-      const Moved& joint = moved_[contact_frame.parentJoint];
-      contact->setPose(joint.placement * contact_frame.placement);
-      const pinocchio::SE3 surface = contact->getSurfacePose();
-      Eigen::Vector3d lowest = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
-      for (Eigen::Index corner = 0; corner < corners.cols(); ++corner) {
-        const Eigen::Vector3d point =
-            surface.act(Eigen::Vector3d(corners(0, corner), corners(1, corner), 0.));
-        if (point.z() < lowest.z()) lowest = point;
+  void place(const Motion& motion, Eigen::Index first, Eigen::Index frames,
+             std::vector<ContactMotion>& contacts) {
+    if (lanes_) lanes_->place(motion, first, frames);
+    for (Eigen::Index k = 0; k < frames; ++k) {
+      const Eigen::Index frame = first + k;
+      const bool is_placed = lanes_ && lanes_->outcome(k) != lanes::Outcome::Nothing;
+      if (!is_placed) moveJoints(motion, frame);
+      for (std::size_t i = 0; i < contacts_.size(); ++i) {
+        if (is_placed)
+          write(contacts_[i], lanes_->placement(i, k), lanes_->velocity(i, k), frame, contacts[i]);
+        else
+          write(contacts_[i], findPlacement(contacts_[i]), findVelocity(contacts_[i]), frame,
+                contacts[i]);
       }
-      const Eigen::Vector3d arm = joint.placement.actInv(lowest);
-      contacts[k].position.col(frame) = surface.translation();
-      contacts[k].rotation.col(frame) = Eigen::Quaterniond(surface.rotation()).coeffs();
-      contacts[k].height[frame] = lowest.z();
-      contacts[k].velocity.col(frame) =
-          joint.placement.rotation() *
-          (joint.velocity.linear() + joint.velocity.angular().cross(arm));
     }
   }
 
@@ -146,7 +140,9 @@ class ContactPlacer {
   };
 
   // As pinocchio::forwardKinematics(), for the joints that carry contacts.
-  void moveJoints() {
+  void moveJoints(const Motion& motion, Eigen::Index frame) {
+    q_ = motion.q.col(frame);
+    v_ = motion.v.col(frame);
     for (Joint& joint : joints_) {
       const Moved& parent = moved_[model_.parents[joint.index]];
       Moved& moved = moved_[joint.index];
@@ -158,7 +154,35 @@ class ContactPlacer {
     }
   }
 
+  // Of the contact's frame: in the world, and the velocity of its origin in the world's axes.
+  pinocchio::SE3 findPlacement(const Placed& placed) const {
+    return moved_[placed.frame.parentJoint].placement * placed.frame.placement;
+  }
+  pinocchio::Motion findVelocity(const Placed& placed) const {
+    const Moved& joint = moved_[placed.frame.parentJoint];
+    const pinocchio::Motion own = placed.frame.placement.actInv(joint.velocity);
+    return pinocchio::SE3(findPlacement(placed).rotation(), Eigen::Vector3d::Zero()).act(own);
+  }
+
+  static void write(const Placed& placed, const pinocchio::SE3& placement,
+                    const pinocchio::Motion& velocity, Eigen::Index frame, ContactMotion& motion) {
+    placed.contact->setPose(placement);
+    const pinocchio::SE3 surface = placed.contact->getSurfacePose();
+    Eigen::Vector3d lowest = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+    for (Eigen::Index corner = 0; corner < placed.corners.cols(); ++corner) {
+      const Eigen::Vector3d point =
+          surface.act(Eigen::Vector3d(placed.corners(0, corner), placed.corners(1, corner), 0.));
+      if (point.z() < lowest.z()) lowest = point;
+    }
+    motion.position.col(frame) = surface.translation();
+    motion.rotation.col(frame) = Eigen::Quaterniond(surface.rotation()).coeffs();
+    motion.height[frame] = lowest.z();
+    motion.velocity.col(frame) =
+        velocity.linear() + velocity.angular().cross(lowest - placement.translation());
+  }
+
   const pinocchio::Model& model_;
+  std::optional<internal::LaneAnalysis> lanes_;
   std::vector<Placed> contacts_;
   std::vector<Joint> joints_;  // that carry contacts
   std::vector<Moved> moved_;   // by index of all joints, the first of which is the world
@@ -176,14 +200,17 @@ void ContactSchedule::validate(Eigen::Index frames) const {
 }
 
 std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot, const Motion& motion,
-                                                 int threads) {
+                                                 int threads, int lanes) {
   requireField(threads >= 0, "threads", ">= 0", threads);
+  requireField(lanes >= 1, "lanes", ">= 1", lanes);
+  internal::Desks desks(robot, lanes);
   internal::Workers workers(threads);
-  return internal::computeContactMotions(robot, motion, workers);
+  return internal::computeContactMotions(desks, motion, workers);
 }
 
-std::vector<ContactMotion> internal::computeContactMotions(const DynaCoM& robot,
-                                                           const Motion& motion, Workers& workers) {
+std::vector<ContactMotion> internal::computeContactMotions(Desks& desks, const Motion& motion,
+                                                           Workers& workers) {
+  const DynaCoM& robot = desks.robot();
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by computeContactMotions before initialize()");
   const pinocchio::Model& model = robot.getModel();
@@ -194,10 +221,9 @@ std::vector<ContactMotion> internal::computeContactMotions(const DynaCoM& robot,
     contacts.push_back({name, Eigen::Matrix3Xd(3, frames), Eigen::Matrix4Xd(4, frames),
                         Eigen::VectorXd(frames), Eigen::Matrix3Xd(3, frames)});
   forEachBlock(workers, frames, [&]() -> BlockWork {
-    const auto placer = std::make_shared<ContactPlacer>(robot);
+    const auto placer = std::make_shared<ContactPlacer>(desks);
     return [placer, &motion, &contacts](Eigen::Index first, Eigen::Index size) {
-      for (Eigen::Index frame = first; frame < first + size; ++frame)
-        placer->place(motion, frame, contacts);
+      placer->place(motion, first, size, contacts);
     };
   });
   return contacts;

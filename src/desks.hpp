@@ -3,9 +3,11 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "dynacom/dyna_com.hpp"
+#include "lane_analysis.hpp"
 
 namespace dynacom::internal {
 
@@ -15,9 +17,13 @@ namespace dynacom::internal {
 class Desks {
  public:
   /// @param robot  must outlive this, and not change
-  explicit Desks(const DynaCoM& robot) : robot_(robot) {}
+  /// @param lanes  as AnalysisSettings::lanes
+  explicit Desks(const DynaCoM& robot, int lanes = 1)
+      : robot_(robot), lane_robot_(LaneRobot::make(robot, lanes)) {}
 
   const DynaCoM& robot() const { return robot_; }
+  /// The robot as lanes know it; null where there are none for it.
+  const LaneRobot* laneRobot() const { return lane_robot_ ? &*lane_robot_ : nullptr; }
 
   /// A copy whose contacts are placed by the model; what else it has done before is not undone, see
   /// clear(). It must not outlive this.
@@ -29,6 +35,7 @@ class Desks {
 
  private:
   const DynaCoM& robot_;
+  const std::optional<LaneRobot> lane_robot_;
   std::mutex mutex_;                            // of the next two
   std::vector<std::unique_ptr<DynaCoM>> free_;  // with room for all
   std::size_t copies_ = 0;

@@ -78,33 +78,46 @@ struct JointKind {
 };
 
 // Nothing for a kind that lanes do not know.
-std::optional<JointKind> recognise(const pinocchio::JointModel& joint) {
-  using namespace pinocchio;
+struct Recogniser : boost::static_visitor<std::optional<JointKind>> {
   using Kind = lanes::JointKind;
-  const std::string name = joint.shortname();
-  const auto& variant = joint.toVariant();
-  const Vector3 x = Vector3::UnitX(), y = Vector3::UnitY(), z = Vector3::UnitZ();
-  if (name == JointModelRX::classname()) return JointKind{Kind::Revolute, x};
-  if (name == JointModelRY::classname()) return JointKind{Kind::Revolute, y};
-  if (name == JointModelRZ::classname()) return JointKind{Kind::Revolute, z};
-  if (name == JointModelRUBX::classname()) return JointKind{Kind::UnboundedRevolute, x};
-  if (name == JointModelRUBY::classname()) return JointKind{Kind::UnboundedRevolute, y};
-  if (name == JointModelRUBZ::classname()) return JointKind{Kind::UnboundedRevolute, z};
-  if (name == JointModelPX::classname()) return JointKind{Kind::Prismatic, x};
-  if (name == JointModelPY::classname()) return JointKind{Kind::Prismatic, y};
-  if (name == JointModelPZ::classname()) return JointKind{Kind::Prismatic, z};
-  if (name == JointModelFreeFlyer::classname()) return JointKind{Kind::FreeFlyer};
-  if (name == JointModelSpherical::classname()) return JointKind{Kind::Spherical};
-  if (name == JointModelTranslation::classname()) return JointKind{Kind::Translation};
-  if (name == JointModelPlanar::classname()) return JointKind{Kind::Planar};
-  if (const auto* any = boost::get<JointModelRevoluteUnaligned>(&variant))
-    return JointKind{Kind::Revolute, any->axis};
-  if (const auto* any = boost::get<JointModelRevoluteUnboundedUnaligned>(&variant))
-    return JointKind{Kind::UnboundedRevolute, any->axis};
-  if (const auto* any = boost::get<JointModelPrismaticUnaligned>(&variant))
-    return JointKind{Kind::Prismatic, any->axis};
-  return std::nullopt;
-}
+  using Result = std::optional<JointKind>;
+
+  template <class Joint>
+  Result operator()(const Joint&) const {
+    return std::nullopt;
+  }
+  template <int axis>
+  Result operator()(const pinocchio::JointModelRevoluteTpl<double, 0, axis>&) const {
+    return JointKind{Kind::Revolute, Vector3::Unit(axis)};
+  }
+  Result operator()(const pinocchio::JointModelRevoluteUnaligned& joint) const {
+    return JointKind{Kind::Revolute, joint.axis};
+  }
+  template <int axis>
+  Result operator()(const pinocchio::JointModelRevoluteUnboundedTpl<double, 0, axis>&) const {
+    return JointKind{Kind::UnboundedRevolute, Vector3::Unit(axis)};
+  }
+  Result operator()(const pinocchio::JointModelRevoluteUnboundedUnaligned& joint) const {
+    return JointKind{Kind::UnboundedRevolute, joint.axis};
+  }
+  template <int axis>
+  Result operator()(const pinocchio::JointModelPrismaticTpl<double, 0, axis>&) const {
+    return JointKind{Kind::Prismatic, Vector3::Unit(axis)};
+  }
+  Result operator()(const pinocchio::JointModelPrismaticUnaligned& joint) const {
+    return JointKind{Kind::Prismatic, joint.axis};
+  }
+  Result operator()(const pinocchio::JointModelFreeFlyer&) const {
+    return JointKind{Kind::FreeFlyer};
+  }
+  Result operator()(const pinocchio::JointModelSpherical&) const {
+    return JointKind{Kind::Spherical};
+  }
+  Result operator()(const pinocchio::JointModelTranslation&) const {
+    return JointKind{Kind::Translation};
+  }
+  Result operator()(const pinocchio::JointModelPlanar&) const { return JointKind{Kind::Planar}; }
+};
 
 void write(const pinocchio::SE3& placement, double* numbers) {
   Matrix3::Map(numbers) = placement.rotation();
@@ -137,8 +150,7 @@ bool describe(const ContactBase& contact, lanes::Contact& description) {
 
 }  // namespace
 
-std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, double ground_height,
-                                         bool flat_horizontal_ground, int lanes) {
+std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, int lanes) {
   LaneRobot made;
   made.interface_ = findInterface(lanes);
   if (!made.interface_) return std::nullopt;
@@ -148,7 +160,7 @@ std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, double ground_hei
   // From the axes that lanes want, of which z is the joint's, to those of the joint.
   std::vector<pinocchio::SE3> aligned = {pinocchio::SE3::Identity()};
   for (std::size_t k = 1; k < static_cast<std::size_t>(model.njoints); ++k) {
-    const std::optional<JointKind> kind = recognise(model.joints[k]);
+    const auto kind = boost::apply_visitor(Recogniser(), model.joints[k].toVariant());
     if (!kind) return std::nullopt;
     if (std::abs(kind->axis.norm() - 1.) > kUnit) return std::nullopt;
     Matrix3 to_axis = Matrix3::Identity();
@@ -188,18 +200,19 @@ std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, double ground_hei
   made.robot_.contacts = static_cast<int>(made.contacts_.size());
   Vector3::Map(made.robot_.gravity) = robot.getSettings().gravity;
   Vector6::Map(made.robot_.wrench_weights) = robot.getWrenchWeights();
-  made.robot_.ground_height = ground_height;
   made.robot_.minimal_vertical_force = robot.getMinimalVerticalForce();
-  made.robot_.flat_horizontal_ground = flat_horizontal_ground;
   return made;
 }
 
-LaneAnalysis::LaneAnalysis(const LaneRobot& robot)
-    : robot_(robot), analysis_(nullptr, robot.interface_->destroy) {
+LaneAnalysis::LaneAnalysis(const LaneRobot& robot, double ground_height,
+                           bool flat_horizontal_ground)
+    : interface_(*robot.interface_), analysis_(nullptr, interface_.destroy) {
   lanes::Robot description = robot.robot_;
   description.joint = robot.joints_.data();
   description.contact = robot.contacts_.data();
-  analysis_.reset(robot.interface_->create(&description));
+  description.ground_height = ground_height;
+  description.flat_horizontal_ground = flat_horizontal_ground;
+  analysis_.reset(interface_.create(&description));
   if (!analysis_) throw std::bad_alloc();
   rows_.resize(robot.contacts_.size());
 }
@@ -237,13 +250,30 @@ void LaneAnalysis::run(const Motion& motion, Eigen::Index first, Eigen::Index fr
   described.contacts = rows_.data();
   described.placements = placements_.data();
   described.outcomes = outcomes_.data();
-  robot_.interface_->run(analysis_.get(), &described);
+  interface_.run(analysis_.get(), &described);
+}
+
+void LaneAnalysis::place(const Motion& motion, Eigen::Index first, Eigen::Index frames) {
+  const auto size = static_cast<std::size_t>(frames);
+  outcomes_.resize(size);
+  placements_.resize(12 * rows_.size() * size);
+  velocities_.resize(6 * rows_.size() * size);
+  const lanes::Places places = {frames,
+                                motion.q.col(first).data(),
+                                motion.v.col(first).data(),
+                                placements_.data(),
+                                velocities_.data(),
+                                outcomes_.data()};
+  interface_.place(analysis_.get(), &places);
 }
 
 pinocchio::SE3 LaneAnalysis::placement(std::size_t contact, Eigen::Index frame) const {
-  const double* numbers =
-      placements_.data() + 12 * (static_cast<std::size_t>(frame) * rows_.size() + contact);
+  const double* numbers = placements_.data() + 12 * index(contact, frame);
   return {Matrix3::Map(numbers), Vector3::Map(numbers + 9)};
+}
+
+pinocchio::Motion LaneAnalysis::velocity(std::size_t contact, Eigen::Index frame) const {
+  return pinocchio::Motion(Vector6::Map(velocities_.data() + 6 * index(contact, frame)));
 }
 
 }  // namespace dynacom::internal

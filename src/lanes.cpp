@@ -115,23 +115,33 @@ class Analysis {
       : robot_(robot),
         joints_(robot.joint, robot.joint + robot.joints),
         contacts_(robot.contact, robot.contact + robot.contacts),
+        carries_(joints_.size()),
         moving_(joints_.size()),
         standing_(contacts_.size()) {
     mass_ = 0.;
     for (const Joint& joint : joints_) mass_ += joint.mass;
+    for (const Contact& contact : contacts_)
+      for (int joint = contact.parent; joint >= 0; joint = joints_[std::size_t(joint)].parent)
+        carries_[std::size_t(joint)] = true;
   }
 
   void run(const Frames& frames) {
     for (first_ = 0; first_ < frames.count; first_ += kLanes) {
-      count_ = static_cast<int>(std::min<std::ptrdiff_t>(kLanes, frames.count - first_));
-      for (int lane = 0; lane < kLanes; ++lane) {  // those too many do what the last one does
-        const std::ptrdiff_t frame = first_ + std::min(lane, count_ - 1);
-        q_[lane] = frames.q + frame * robot_.nq;
-        v_[lane] = frames.v + frame * robot_.nv;
-        a_[lane] = frames.a + frame * robot_.nv;
-      }
+      take(frames.count, frames.q, frames.v, frames.a);
       computeDynamics(frames);
       distribute(frames);
+    }
+  }
+
+  void place(const Places& places) {
+    for (first_ = 0; first_ < places.count; first_ += kLanes) {
+      take(places.count, places.q, places.v, places.v);  // nobody asks for accelerations
+      for (std::size_t k = 0; k < joints_.size(); ++k)
+        if (carries_[k]) moving_[k] = move(joints_[k]);
+      for (std::size_t k = 0; k < contacts_.size(); ++k) placeContact(places, k);
+      const Mask known = normalized_ && nothing_ == 0.;
+      for (int lane = 0; lane < count_; ++lane)
+        places.outcomes[first_ + lane] = known[lane] ? Outcome::Dynamics : Outcome::Nothing;
     }
   }
 
@@ -145,6 +155,19 @@ class Analysis {
     Vector moments[3];
     Lanes force[6];
   };
+
+  // The frames at hand, from the first on.
+  void take(std::ptrdiff_t count, const double* q, const double* v, const double* a) {
+    count_ = static_cast<int>(std::min<std::ptrdiff_t>(kLanes, count - first_));
+    for (int lane = 0; lane < kLanes; ++lane) {  // those too many do what the last one does
+      const std::ptrdiff_t frame = first_ + std::min(lane, count_ - 1);
+      q_[lane] = q + frame * robot_.nq;
+      v_[lane] = v + frame * robot_.nv;
+      a_[lane] = a + frame * robot_.nv;
+    }
+    nothing_ = 0.;
+    normalized_ = Mask(true);
+  }
 
   // The numbers of a component, which must be finite.
   Lanes load(const double* const* columns, int row) {
@@ -177,6 +200,10 @@ class Analysis {
   void store(double* columns, const Vector& values) const {
     store(columns, 3, 0, {values.x, values.y, values.z});
   }
+  void storePlacement(double* placements, std::size_t k, const Matrix& R, const Vector& p) const {
+    store(placements, 12 * robot_.contacts, 12 * static_cast<int>(k),
+          {R.x.x, R.x.y, R.x.z, R.y.x, R.y.y, R.y.z, R.z.x, R.z.y, R.z.z, p.x, p.y, p.z});
+  }
   // The same, where something is so.
   template <int kRows>
   void storeWhere(const Mask& mask, double* columns, const Lanes (&values)[kRows]) const {
@@ -191,6 +218,7 @@ class Analysis {
   Moving move(const Joint& joint);
   void addBody(const Joint& joint, const Moving& moving);
   void computeDynamics(const Frames& frames);
+  void placeContact(const Places& places, std::size_t k) const;
   void place(const Frames& frames);
   Mask findForces();
   void distribute(const Frames& frames);
@@ -200,6 +228,7 @@ class Analysis {
   const std::vector<Joint> joints_;
   const std::vector<Contact> contacts_;
   double mass_;
+  std::vector<bool> carries_;       // which joints have contacts beyond them
   std::vector<Moving> moving_;      // by joint
   std::vector<Standing> standing_;  // by contact
 
@@ -359,8 +388,6 @@ void Analysis::addBody(const Joint& joint, const Moving& moving) {
 
 // Newton and Euler (1, 2), and the centre of pressure (5).
 void Analysis::computeDynamics(const Frames& frames) {
-  nothing_ = 0.;
-  normalized_ = Mask(true);
   places_ = momentum_ = momentum_rate_ = angular_momentum_ = angular_momentum_rate_ = zero();
   for (std::size_t k = 0; k < joints_.size(); ++k) {
     moving_[k] = move(joints_[k]);
@@ -394,6 +421,18 @@ void Analysis::computeDynamics(const Frames& frames) {
   store(frames.cop, 2, 0, {x, y});
 }
 
+void Analysis::placeContact(const Places& places, std::size_t k) const {
+  const Contact& contact = contacts_[k];
+  const Moving& parent = moving_[static_cast<std::size_t>(contact.parent)];
+  const Vector arm = parent.rotation * broadcast(contact.placement + 9);
+  storePlacement(places.placements, k, parent.rotation * broadcastMatrix(contact.placement),
+                 parent.position + arm);
+  const Vector& spin = parent.angular_velocity;
+  const Vector velocity = parent.velocity + cross(spin, arm);
+  store(places.velocities, 6 * robot_.contacts, 6 * static_cast<int>(k),
+        {velocity.x, velocity.y, velocity.z, spin.x, spin.y, spin.z});
+}
+
 void Analysis::place(const Frames& frames) {
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
     const Contact& contact = contacts_[k];
@@ -406,11 +445,7 @@ void Analysis::place(const Frames& frames) {
     const Moving& parent = moving_[static_cast<std::size_t>(contact.parent)];
     standing.rotation = parent.rotation * broadcastMatrix(contact.placement);
     Vector origin = parent.position + parent.rotation * broadcast(contact.placement + 9);
-    const int rows = 12 * robot_.contacts, row = 12 * static_cast<int>(k);
-    const Matrix& R = standing.rotation;
-    store(frames.placements, rows, row,
-          {R.x.x, R.x.y, R.x.z, R.y.x, R.y.y, R.y.z, R.z.x, R.z.y, R.z.z, origin.x, origin.y,
-           origin.z});
+    storePlacement(frames.placements, k, standing.rotation, origin);
     if (contact.world_aligned) standing.rotation = identity();
     origin = origin - Lanes(contact.radius) * standing.rotation.z;
     standing.lever = origin - com_;
@@ -601,9 +636,13 @@ void* create(const Robot* robot) {
 
 void run(void* analysis, const Frames* frames) { static_cast<Analysis*>(analysis)->run(*frames); }
 
+void place(void* analysis, const Places* places) {
+  static_cast<Analysis*>(analysis)->place(*places);
+}
+
 void destroy(void* analysis) { delete static_cast<Analysis*>(analysis); }
 
-constexpr Interface kInterface = {kVersion, kLanes, &create, &run, &destroy};
+constexpr Interface kInterface = {kVersion, kLanes, &create, &run, &place, &destroy};
 
 }  // namespace
 }  // namespace dynacom::lanes

@@ -82,17 +82,28 @@ struct Frames {
   Outcome* outcomes;
 };
 
+/// Where frames are, and where it goes how the contacts' frames lie and move in them.
+struct Places {
+  std::ptrdiff_t count;
+  const double *q, *v;
+  double* placements;  // in the world: 12 × contacts × frames
+  double* velocities;  // linear, of the frame's origin, and angular, in the world: 6 × contacts ×
+                       // frames
+  Outcome* outcomes;   // Dynamics, or Nothing
+};
+
 /// What each shared object gives by the function "dynacom_lanes".
 struct Interface {
   int version;  // of what stands here
   int lanes;
-  /// Makes what run() takes; the robot is copied. Null where there is no memory.
+  /// Makes what the others take; the robot is copied. Null where there is no memory.
   void* (*create)(const Robot* robot);
   void (*run)(void* analysis, const Frames* frames);
+  void (*place)(void* analysis, const Places* places);
   void (*destroy)(void* analysis);
 };
 
-constexpr int kVersion = 1;  // grows with each change to this file
+constexpr int kVersion = 2;  // grows with each change to this file
 constexpr char kEntry[] = "dynacom_lanes";
 using Entry = const Interface* (*)();
 

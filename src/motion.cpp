@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "check.hpp"
+#include "configuration_steps.hpp"
 #include "motion_check.hpp"
 #include "nan.hpp"
 
@@ -127,23 +128,21 @@ struct Section {
   // Filters columns in place, from the first to the last; before the first all was as it is there.
   template <class Space>
   void filter(const Space& space, Eigen::MatrixXd& q) const {
-    Eigen::VectorXd x = q.col(0), x1 = x, x2 = x, y1 = x, y2 = x, y(x.size());
-    Eigen::VectorXd difference(space.size()), step(space.size());
+    Eigen::VectorXd x = q.col(0), x1 = x, x2 = x, y1 = x, y(x.size());
+    Eigen::VectorXd difference(space.size()), step = Eigen::VectorXd::Zero(space.size());
     const auto add = [&](double factor, const Eigen::VectorXd& point) {
       space.difference(y1, point, difference);
       step += factor * difference;
     };
     for (Eigen::Index frame = 0; frame < q.cols(); ++frame) {
       x = q.col(frame);
-      step.setZero();
+      step *= a2;  // the way back to y2 is −step
       add(b, x);
       add(2. * b, x1);
       add(b, x2);
-      add(-a2, y2);
       space.integrate(y1, step, y);
       x2.swap(x1);
       x1.swap(x);
-      y2.swap(y1);
       y1 = y;
       q.col(frame) = y;
     }
@@ -268,12 +267,7 @@ Motion differentiate(const pinocchio::Model& model, const Eigen::VectorXd& time,
   if (frames < 2) return motion;
 
   // From each frame to the next; back again it is the same with the other sign.
-  Eigen::MatrixXd steps(model.nv, frames - 1);
-  Eigen::VectorXd step(model.nv);
-  for (Eigen::Index frame = 0; frame + 1 < frames; ++frame) {
-    pinocchio::difference(model, q.col(frame), q.col(frame + 1), step);
-    steps.col(frame) = step;
-  }
+  const Eigen::MatrixXd steps = internal::ConfigurationSteps(model).compute(q);
   if (frames == 2) {
     motion.v.colwise() = steps.col(0) / (time[1] - time[0]);
     return motion;
@@ -322,12 +316,11 @@ DerivativeMismatch compareDerivatives(const pinocchio::Model& model, const Motio
   };
   const std::size_t count = begins.size() - 1;
   std::vector<Part> velocities(count), accelerations(count);
+  const Eigen::MatrixXd steps = internal::ConfigurationSteps(model).compute(motion.q);
   Eigen::VectorXd step(model.nv), slope(model.nv);
-  const Eigen::Index steps = motion.frames() - 1;
-  for (Eigen::Index frame = 0; frame < steps; ++frame) {
+  for (Eigen::Index frame = 0; frame < steps.cols(); ++frame) {
     const double duration = motion.time[frame + 1] - motion.time[frame];
-    pinocchio::difference(model, motion.q.col(frame), motion.q.col(frame + 1), step);
-    step /= duration;
+    step = steps.col(frame) / duration;
     slope = (motion.v.col(frame + 1) - motion.v.col(frame)) / duration;
     for (std::size_t part = 0; part < count; ++part) {
       const Eigen::Index begin = begins[part], size = begins[part + 1] - begin;
@@ -341,12 +334,12 @@ DerivativeMismatch compareDerivatives(const pinocchio::Model& model, const Motio
     }
   }
   DerivativeMismatch mismatch{0., 0.};
-  if (steps == 0) return mismatch;
+  if (steps.cols() == 0) return mismatch;
   for (std::size_t part = 0; part < count; ++part) {
     mismatch.velocity =
-        std::max(mismatch.velocity, velocities[part].ratio(double(steps), kLeastVelocity));
-    mismatch.acceleration = std::max(mismatch.acceleration,
-                                     accelerations[part].ratio(double(steps), kLeastAcceleration));
+        std::max(mismatch.velocity, velocities[part].ratio(double(steps.cols()), kLeastVelocity));
+    mismatch.acceleration = std::max(
+        mismatch.acceleration, accelerations[part].ratio(double(steps.cols()), kLeastAcceleration));
   }
   return mismatch;
 }

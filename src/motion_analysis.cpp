@@ -67,8 +67,8 @@ MotionAnalysis makeStorage(const std::vector<std::string>& names, const Motion& 
 // What a thread does with blocks of frames.
 class Analyst {
  public:
-  Analyst(Desks& desks, double ground_height, const LaneRobot* lane_robot, const Motion& motion,
-          const ContactSchedule& schedule, const AnalysisSettings& settings, MotionAnalysis& result)
+  Analyst(Desks& desks, double ground_height, const Motion& motion, const ContactSchedule& schedule,
+          const AnalysisSettings& settings, MotionAnalysis& result)
       : desks_(desks),
         ground_height_(ground_height),
         motion_(motion),
@@ -76,7 +76,7 @@ class Analyst {
         flat_(settings.flat_horizontal_ground),
         check_(desks.robot().getModel()),
         result_(result) {
-    if (lane_robot) lanes_.emplace(*lane_robot);
+    if (desks.laneRobot()) lanes_.emplace(*desks.laneRobot(), ground_height, flat_);
   }
 
   void analyze(Eigen::Index first, Eigen::Index frames) {
@@ -247,14 +247,14 @@ int countLanes(const DynaCoM& robot, int lanes) {
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by countLanes before initialize()");
   internal::requireField(lanes >= 1, "lanes", ">= 1", lanes);
-  const auto lane_robot = LaneRobot::make(robot, robot.getGroundHeight(), true, lanes);
+  const auto lane_robot = LaneRobot::make(robot, lanes);
   return lane_robot ? lane_robot->lanes() : 1;
 }
 
 MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
                              const ContactSchedule& schedule, const AnalysisSettings& settings) {
   settings.validate();
-  Desks desks(robot);
+  Desks desks(robot, settings.lanes);
   internal::Workers workers(settings.threads);
   return internal::analyzeMotion(desks, robot.getGroundHeight(), motion, schedule, settings,
                                  workers);
@@ -273,12 +273,9 @@ MotionAnalysis internal::analyzeMotion(Desks& desks, double ground_height, const
   for (const std::string& name : schedule.names) robot.getContact(name);
   const std::vector<std::string> names = robot.getKnownContacts();
   MotionAnalysis result = makeStorage(names, motion, schedule);
-  const auto lane_robot =
-      LaneRobot::make(robot, ground_height, settings.flat_horizontal_ground, settings.lanes);
   const auto makeWork = [&]() -> BlockWork {
     const auto analyst =
-        std::make_shared<Analyst>(desks, ground_height, lane_robot ? &*lane_robot : nullptr, motion,
-                                  schedule, settings, result);
+        std::make_shared<Analyst>(desks, ground_height, motion, schedule, settings, result);
     return [analyst](Eigen::Index first, Eigen::Index frames) { analyst->analyze(first, frames); };
   };
   try {

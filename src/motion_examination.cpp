@@ -24,7 +24,7 @@ struct MotionExaminer::Office {
   Office(const DynaCoM& given, const ExaminationSettings& given_settings)
       : robot(given),
         settings(given_settings),
-        desks(robot),
+        desks(robot, given_settings.analysis.lanes),
         workers(given_settings.analysis.threads) {}
 
   MotionExamination examine(const RecordedMotion& recorded);
@@ -39,7 +39,7 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   MotionExamination found = {};
   found.derived = deriveMotion(robot.getModel(), recorded, settings.cutoff);
   const Motion& motion = found.derived.motion;
-  found.contacts = internal::computeContactMotions(robot, motion, workers);
+  found.contacts = internal::computeContactMotions(desks, motion, workers);
   found.ground = estimateGround(found.contacts, motion.time, settings.detection);
   found.schedule = recorded.schedule.has_value() ? *recorded.schedule
                                                  : detectContacts(found.contacts, motion.time,
@@ -80,7 +80,7 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
     CutoffSensitivity sensitivity = {};
     sensitivity.cutoff = cutoff;
     sensitivity.verdict =
-        judge(other, internal::computeContactMotions(robot, other, workers), analysis);
+        judge(other, internal::computeContactMotions(desks, other, workers), analysis);
     sensitivity.statistics = summarizeMotion(robot, other, analysis, sensitivity.verdict);
     found.sensitivity.push_back(std::move(sensitivity));
   }

@@ -12,11 +12,11 @@
 
 namespace dynacom::internal {
 
-std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot, const Motion& motion,
+std::vector<ContactMotion> computeContactMotions(Desks& desks, const Motion& motion,
                                                  Workers& workers);
 
 /// @param ground_height  in place of the robot's [m]
-/// @param settings       of which the threads are not looked at
+/// @param settings       of which threads and lanes are not looked at
 MotionAnalysis analyzeMotion(Desks& desks, double ground_height, const Motion& motion,
                              const ContactSchedule& schedule, const AnalysisSettings& settings,
                              Workers& workers);

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <ostream>
-#include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
 
 #include "check.hpp"
+#include "configuration_steps.hpp"
 #include "motion_steps.hpp"
 
 namespace dynacom {
@@ -60,12 +60,7 @@ Eigen::VectorXd measureJumps(const pinocchio::Model& model, const Eigen::MatrixX
   const Eigen::Index frames = q.cols(), last = frames - 2;
   Eigen::VectorXd jumps = Eigen::VectorXd::Zero(frames);
   if (frames < 4) return jumps;
-  Eigen::MatrixXd steps(model.nv, frames - 1);
-  Eigen::VectorXd step(model.nv);
-  for (Eigen::Index k = 0; k <= last; ++k) {
-    pinocchio::difference(model, q.col(k), q.col(k + 1), step);
-    steps.col(k) = step;
-  }
+  const Eigen::MatrixXd steps = internal::ConfigurationSteps(model).compute(q);
   const auto distance = [&](Eigen::Index k, const auto& expected) {
     return (steps.col(k) - expected).template lpNorm<Eigen::Infinity>();
   };

@@ -35,12 +35,13 @@ struct ContactMotion {
 
 /// The motions of all contacts that a robot knows, in the order of getKnownContacts(), placed by
 /// the model.
-/// @param threads  as AnalysisSettings::threads
-/// @throws std::invalid_argument if the motion is not valid; NotReadyError before the robot's
-///         initialize()
+/// @param threads, lanes  as in AnalysisSettings
+/// @throws std::invalid_argument if the motion or a number is not valid; NotReadyError before the
+///         robot's initialize()
 DYNACOM_EXPORT std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot,
                                                                 const Motion& motion,
-                                                                int threads = 0);
+                                                                int threads = 0,
+                                                                int lanes = kMaximalLanes);
 
 /// Where the ground is, and when a contact is held to touch it.
 struct DYNACOM_EXPORT DetectionSettings {

@@ -28,8 +28,6 @@ struct DYNACOM_EXPORT AnalysisSettings {
   /// countLanes(). 1 stands for none of that. Results are the same but for rounding.
   int lanes = kMaximalLanes;
 
-  static constexpr int kMaximalLanes = 8;
-
   /// @throws std::invalid_argument unless omega is finite and >= 0, threads >= 0 and lanes >= 1
   void validate() const;
 };
@@ -39,7 +37,7 @@ struct DYNACOM_EXPORT AnalysisSettings {
 /// than those of URDFs, other contacts than ContactPoint and Contact6D, or one that is fixed to the
 /// world.
 /// @throws std::invalid_argument unless lanes >= 1; NotReadyError before the robot's initialize()
-DYNACOM_EXPORT int countLanes(const DynaCoM& robot, int lanes = AnalysisSettings::kMaximalLanes);
+DYNACOM_EXPORT int countLanes(const DynaCoM& robot, int lanes = kMaximalLanes);
 
 /// What analyzeMotion() found: one column per frame, in the world's axes, SI units.
 struct MotionAnalysis {

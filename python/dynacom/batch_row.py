@@ -3,6 +3,7 @@
 
 import hashlib
 import json
+import math
 import os
 import secrets
 import time
@@ -17,12 +18,24 @@ import numpy as np
 
 from dynacom.analysis_options import AnalysisOptions
 from dynacom.batch_files import local_copy, printable
-from dynacom.dynacom_pywrap import Contact6DSettings, ContactPointSettings, __version__
+from dynacom.dynacom_pywrap import (
+    Contact6DSettings,
+    ContactPointSettings,
+    DistributionStatus,
+    __version__,
+)
 from dynacom.errors import DynacomError
 from dynacom.motion_clip import Options
 from dynacom.motion_file import Clip, read_motion
 from dynacom.motion_pickle import read_clips
-from dynacom.motion_report import FAULTS, MotionReport, examine, make_examiner
+from dynacom.motion_report import (
+    FAULTS,
+    MotionReport,
+    examine,
+    holding_codes,
+    make_examiner,
+    verdict_text,
+)
 from dynacom.robots import Robot
 
 if TYPE_CHECKING:
@@ -75,7 +88,20 @@ _LAST_COLUMNS = (
     ("seconds", "double", "s"),
     ("dynacom", "string", ""),
 )
-_STATUSES = {"Solved": "solved", "Relaxed": "relaxed", "NoContact": "no_contact"}
+# Columns that are fields of MotionStatistics.
+_STATISTICS = (
+    "frames",
+    "mass",
+    "mean_vertical_force",
+    "momentum_change",
+    "residual_force_rms",
+    "residual_torque_rms",
+)
+_STATUSES = {
+    DistributionStatus.Solved: "solved_share",
+    DistributionStatus.Relaxed: "relaxed_share",
+    DistributionStatus.NoContact: "no_contact_share",
+}
 _MEASURED = tuple(
     f"measured_{part}_{axis}" for part in ("force", "torque") for axis in ("x", "y", "z")
 )
@@ -285,26 +311,40 @@ def _message(error: Exception, name: str, path: Path) -> str:
 
 
 def _report_row(report: MotionReport, name: str) -> Row:
-    summary = report.summary
-    row = {key: summary[key] for key, _, _ in _COLUMNS if key in summary}
-    row |= {
+    """What the summary says, without its sentences: those take as long as the analysis."""
+    found = report.examination
+    statistics, derived = found.statistics, found.derived
+    findings = found.verdict.findings
+    row = {
         "file": name,
         "robot": printable(report.robot.name),
         "status": "ok",
-        "feasible": report.verdict.feasible,
-        "severity": max((r["share"] for r in summary["reasons"] if r["holds"]), default=0.0),
+        "verdict": verdict_text(found.verdict),
+        "feasible": found.verdict.feasible,
+        "codes": holding_codes(findings),
+        "severity": max((f.frames for f in findings.values() if f.holds), default=0)
+        / statistics.frames,
+        "duration": float(report.clip.time[-1] - report.clip.time[0]),
+        "frame_rate": derived.frame_rate,
+        "omega": found.analysis.omega,
+        "cutoff": derived.cutoff or None,
         "dynacom": __version__,
     }
-    for status, prefix in _STATUSES.items():
-        row[f"{prefix}_share"] = summary["statuses"].get(status, 0) / summary["frames"]
-    for reason in summary["reasons"]:
+    for column in _STATISTICS:
+        row[column] = getattr(statistics, column)
+    for status, column in _STATUSES.items():
+        row[column] = statistics.share(status)
+    for code, finding in findings.items():
         for column, _, _ in _FAULT_COLUMNS:
-            row[f"{reason['code']}.{column}"] = reason[column]
-    for contact, found in summary["contacts"].items():
-        found = found | {"ground": summary["ground"][contact]}
+            row[f"{code}.{column}"] = getattr(finding, column)
+    for contact, ground in zip(statistics.contacts, found.ground.tolist(), strict=True):
         for column, _, _ in _CONTACT_COLUMNS:
-            row[f"contact.{contact}.{column}"] = found[column]
-    return row
+            value = ground if column == "ground" else getattr(contact, column)
+            row[f"contact.{contact.name}.{column}"] = value
+    return {
+        column: None if isinstance(value, float) and not math.isfinite(value) else value
+        for column, value in row.items()
+    }
 
 
 # Frames.

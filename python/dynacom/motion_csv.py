@@ -116,19 +116,20 @@ def _load_plain(file: _File, above: int, count: int) -> np.ndarray | None:
     """
     try:
         import pyarrow
-        from pyarrow.csv import ConvertOptions, ParseOptions, ReadOptions
-        from pyarrow.csv import read_csv as read_arrow
+        from pyarrow.csv import ConvertOptions, ParseOptions, ReadOptions, open_csv
     except ImportError:
         return None
     columns = [str(column) for column in range(count)]
     try:
         content = gzip.decompress(file.content) if file.is_compressed else file.content
-        table = read_arrow(
+        # Not read_csv, which begins a thread each time.
+        with open_csv(
             pyarrow.BufferReader(content),
             ReadOptions(use_threads=False, skip_rows=above, column_names=columns),
             ParseOptions(quote_char=False),
             ConvertOptions(column_types=dict.fromkeys(columns, pyarrow.float64()), null_values=[]),
-        )
+        ) as reader:
+            table = reader.read_all()
     except (pyarrow.ArrowException, *_NO_GZIP):
         return None
     if not table.num_rows:

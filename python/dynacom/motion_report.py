@@ -2,7 +2,7 @@
 """What a motion asks of the ground, frame by frame and as a whole."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +20,7 @@ from dynacom.dynacom_pywrap import (
     MotionAnalysis,
     MotionExamination,
     MotionExaminer,
+    MotionFinding,
     MotionVerdict,
     RecordedMotion,
     compareMeasured,
@@ -383,8 +384,8 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         "duration": float(clip.time[-1] - clip.time[0]),
         "frame_rate": derived.frame_rate,
         "omega": found.analysis.omega,
-        "verdict": "feasible" if found.verdict.feasible else "not feasible",
-        "codes": _codes(found.verdict),
+        "verdict": verdict_text(found.verdict),
+        "codes": holding_codes(found.verdict.findings),
         "reasons": _reasons(found.verdict, report.options, statistics.frames),
         "statuses": {status.name: frames for status, frames in statistics.statuses.items()},
         "residual_force_rms": statistics.residual_force_rms,
@@ -463,9 +464,14 @@ def _unexplained_text(unexplained: dict[str, Any]) -> str:
     )
 
 
-def _codes(verdict: MotionVerdict) -> list[str]:
-    holding = [code for code, finding in verdict.findings.items() if finding.holds]
-    return holding or ["feasible"]
+def verdict_text(verdict: MotionVerdict) -> str:
+    """As results have it."""
+    return "feasible" if verdict.feasible else "not feasible"
+
+
+def holding_codes(findings: Mapping[str, MotionFinding]) -> list[str]:
+    """The codes of the faults that hold, or ``feasible``."""
+    return [code for code, finding in findings.items() if finding.holds] or ["feasible"]
 
 
 def _reasons(verdict: MotionVerdict, options: AnalysisOptions, frames: int) -> list[dict[str, Any]]:
@@ -505,7 +511,7 @@ def _residuals(
         "residual_force_rms": statistics.residual_force_rms,
         "residual_torque_rms": statistics.residual_torque_rms,
         "relaxed_share": statistics.share(DistributionStatus.Relaxed),
-        "codes": _codes(found.verdict),
+        "codes": holding_codes(found.verdict.findings),
     }
 
 
