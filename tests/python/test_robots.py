@@ -161,10 +161,10 @@ def test_lanes(name, flat):
             assert_same(one.wrench / weight, other.wrench / weight)
             for key in ("cop", "friction_usage", "yaw_usage", "cop_margin"):
                 assert_same(getattr(one, key), getattr(other, key))
-        placed = computeContactMotions(dynamics, motion, lanes=lanes)
-        for one, other in zip(
-            placed, computeContactMotions(dynamics, motion, lanes=1), strict=True
-        ):
+        placed, alone = (
+            computeContactMotions(dynamics, motion, lanes=number) for number in (lanes, 1)
+        )
+        for one, other in zip(placed, alone, strict=True):
             for key in ("position", "rotation", "height", "velocity"):
                 assert_same(getattr(one, key), getattr(other, key))
 
