@@ -44,7 +44,7 @@ def cores(number):
 
 
 def look_at_memory(process):
-    """Peaks of a batch, its own and the largest of its workers' [kB], once it has ended."""
+    """Peaks of a batch, its own and that of the largest of its workers [kB], once it has ended."""
     peaks = {}  # by process
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
     while process.poll() is None:
@@ -198,7 +198,7 @@ def engines(files, folder, seconds, rate):
 
 def measure(quick):
     """All that docs/performance.md says of batches."""
-    number, repetitions, seconds = (100, 3, 5) if quick else (1000, 9, 75)
+    number, repetitions, seconds = (200, 2, 5) if quick else (1000, 9, 75)
     with tempfile.TemporaryDirectory(prefix="dynacom-bench-") as temporary:
         folder, few = Path(temporary, "clips"), Path(temporary, "few")
         folder.mkdir()
@@ -208,7 +208,7 @@ def measure(quick):
         say("batch")
         result = {"lanes": batch_shares.count_lanes(), **rates(folder, few, repetitions)}
         say("batch, shares")
-        result |= batch_shares.measure(files[:: 1 if quick else 4], repetitions=5)
+        result |= batch_shares.measure(files[::4], repetitions=5)
         say("batch, memory")
         result["memory"] = memory(files, Path(temporary), (1, 4))
         if importlib.util.find_spec("ray"):

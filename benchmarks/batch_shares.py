@@ -5,7 +5,6 @@ waiting for the disk, is not in them.
 """
 
 import hashlib
-import statistics
 import tempfile
 import time
 from collections import Counter
@@ -129,34 +128,30 @@ class Bench:
             return timed(write, Path(folder))[1] / len(rows)
 
 
-def readers(files, robot):
-    """{reader: seconds}: medians."""
+def readers(file, robot):
+    """{reader: seconds} for one clip."""
+    options = pyarrow.csv.ReadOptions(autogenerate_column_names=True)
     calls = {
-        "`numpy.loadtxt`": lambda file: np.loadtxt(file, delimiter=","),
-        "`pyarrow.csv.read_csv`": lambda file: pyarrow.csv.read_csv(
-            file, pyarrow.csv.ReadOptions(autogenerate_column_names=True)
-        ),
-        "`dynacom.read_motion`": lambda file: dynacom.read_motion(file, robot, fps=clips.FPS),
+        "`numpy.loadtxt`": lambda: np.loadtxt(file, delimiter=","),
+        "`pyarrow.csv.read_csv`": lambda: pyarrow.csv.read_csv(file, options),
+        "`dynacom.read_motion`": lambda: dynacom.read_motion(file, robot, fps=clips.FPS),
     }
-    times = {name: [] for name in calls}
-    for file in files:
-        for name, call in calls.items():
-            times[name].append(timed(call, file)[1])
-    return {name: statistics.median(values) for name, values in times.items()}
+    return {name: timed(call)[1] for name, call in calls.items()}
 
 
 def measure(files, repetitions):
-    """Means of each step for these clips, and what part stand-alone calls are of examine()."""
+    """Means for these clips: of each step, and of readers; and what stand-alone steps count for."""
     bench = Bench()
     robot = bench.job.robot
     bench.outline(files[0])  # what is loaded on demand
-    total, alone = Counter(), Counter()
+    total, alone, reading = Counter(), Counter(), Counter()
     for file in files:
         total.update(least(repetitions, bench.outline, file))
         clip = dynacom.read_motion(file, robot, fps=clips.FPS)
         steps = least(repetitions, bench.examination, clip, clips.FRAMES)
         few = least(repetitions, bench.examination, clip, FEW)
         alone.update({name: steps[name] - few[name] for name in steps})
+        reading.update(least(repetitions, readers, file, robot))
     seconds = {name: value / len(files) for name, value in total.items()}
     scale = total["examining"] / alone.total()
     seconds |= {name: scale * value / len(files) for name, value in alone.items()}
@@ -166,5 +161,5 @@ def measure(files, repetitions):
     return {
         "shares": {name: seconds[name] for name in STEPS},
         "scale": scale,
-        "readers": readers(files, robot),
+        "readers": {name: value / len(files) for name, value in reading.items()},
     }
