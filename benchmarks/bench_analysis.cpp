@@ -9,7 +9,7 @@
 #include <malloc.h>
 
 #include <cmath>
-#include <dynacom/motion_analysis.hpp>
+#include <dynacom/motion_examination.hpp>
 #include <fstream>
 #include <pinocchio/algorithm/centroidal.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
@@ -23,6 +23,9 @@ namespace dynacom::benchmarks {
 namespace {
 
 constexpr Eigen::Index kFrames = 1024, kManyFrames = 16384;
+// Of clips as datasets have them.
+constexpr Eigen::Index kClipFrames = 300;
+constexpr std::size_t kClips = 64;
 // Of how many frames the general solver gets the problems, one after the other: few enough that
 // their matrices stay in the cache.
 constexpr Eigen::Index kPrograms = 32;
@@ -149,6 +152,28 @@ Case analysis(const std::string& name, const MakeClip& makeClip, const AnalysisS
   return {name, prepare, reference};
 }
 
+// From what was recorded to the verdict, of many short clips.
+Case examination(const std::string& name, int threads, const std::string& reference) {
+  const auto prepare = [threads] {
+    const Clip clip = makeSway(kClipFrames);
+    const RecordedMotion recorded = {clip.motion.time, clip.motion.q};
+    ExaminationSettings settings;
+    settings.analysis.threads = threads;
+    return [robot = clip.robot, recorded, settings] {
+      std::size_t feasible = 0;
+      analyzeMotions(
+          robot, kClips, [&](std::size_t) { return recorded; },
+          [&](std::size_t, const MotionExamination* found, const std::string& error) {
+            if (!found) throw std::logic_error(error);
+            feasible += found->verdict.isFeasible() ? 1 : 0;
+          },
+          settings);
+      if (feasible != kClips) throw std::logic_error("clips that sway are feasible");
+    };
+  };
+  return {name, prepare, reference};
+}
+
 // In one thread, with each number of lanes that the machine has.
 void addClip(std::vector<Case>& cases, const std::string& name, const MakeClip& makeClip) {
   const std::string reference = "Pinocchio and eiquadprog/" + name;
@@ -178,6 +203,9 @@ std::vector<Case> makeCases() {
   const std::string one = "analyzeMotion/1 thread", two = "analyzeMotion/2 threads";
   cases.push_back(analysis(one, makeLong, makeSettings(1, lanes), ""));
   cases.push_back(analysis(two, makeLong, makeSettings(2, lanes), one));
+  const std::string one_by_one = "analyzeMotions/1 thread";
+  cases.push_back(examination(one_by_one, 1, ""));
+  cases.push_back(examination("analyzeMotions/2 threads", 2, one_by_one));
   return cases;
 }
 

@@ -3,6 +3,7 @@
 
 #include <eigenpy/eigenpy.hpp>
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -134,16 +135,16 @@ class WithoutLock {
   PyThreadState* state_;
 };
 
-/// What C++ tells of its progress: a call of what may be called in Python, or nothing for None. It
-/// takes Python's lock; `progress` must outlive it.
+/// What C++ tells of its progress: a call of what may be called in Python, for which it takes
+/// Python's lock, or nothing for None. The last copy must go while the lock is held.
 template <class Part>
 std::function<void(Part)> toProgress(const bp::object& progress) {
   if (progress.is_none()) return nullptr;
-  return [&progress](Part part) {
+  return [function = std::make_shared<const bp::object>(progress)](Part part) {
     const PyGILState_STATE state = PyGILState_Ensure();
     bool failed = false;
     try {
-      progress(part);
+      (*function)(part);
     } catch (const bp::error_already_set&) {
       failed = true;
     }

@@ -22,39 +22,27 @@ std::string writeSensitivity(const CutoffSensitivity& sensitivity) {
                           ", feasible=", sensitivity.verdict.isFeasible() ? "True" : "False", ")");
 }
 
-/// MotionExaminer for Python, where progress is an object, which has to live as long.
-class Examiner {
- public:
-  Examiner(const DynaCoM& robot, double cutoff, bool flat_horizontal_ground, double omega,
-           const DetectionSettings& detection, const VerdictSettings& verdict, bool sensitivity,
-           const bp::object& progress, int threads, int lanes)
-      : progress_(progress),
-        examiner_(robot, {cutoff,
-                          {flat_horizontal_ground, omega, nullptr, threads, lanes},
-                          detection,
-                          verdict,
-                          sensitivity,
-                          toProgress<double>(progress_)}) {}
+std::string writeExaminer(const MotionExaminer& examiner) {
+  const ExaminationSettings& settings = examiner.getSettings();
+  return internal::concat("MotionExaminer(cutoff=", settings.cutoff,
+                          ", sensitivity=", settings.sensitivity ? "True" : "False",
+                          ", threads=", settings.analysis.threads, ")");
+}
 
-  Examination examine(const RecordedMotion& recorded) const {
-    const WithoutLock without_lock;
-    return examiner_.examine(recorded);
-  }
+std::shared_ptr<MotionExaminer> makeExaminer(const DynaCoM& robot, double cutoff,
+                                             bool flat_horizontal_ground, double omega,
+                                             const DetectionSettings& detection,
+                                             const VerdictSettings& verdict, bool sensitivity,
+                                             const bp::object& progress, int threads, int lanes) {
+  const AnalysisSettings analysis = {flat_horizontal_ground, omega, nullptr, threads, lanes};
+  const ExaminationSettings settings = {cutoff,  analysis,    detection,
+                                        verdict, sensitivity, toProgress<double>(progress)};
+  return std::make_shared<MotionExaminer>(robot, settings);
+}
 
- private:
-  const bp::object progress_;
-  const MotionExaminer examiner_;
-};
-
-std::string writeExaminer(const Examiner&) { return "MotionExaminer()"; }
-
-std::shared_ptr<Examiner> makeExaminer(const DynaCoM& robot, double cutoff,
-                                       bool flat_horizontal_ground, double omega,
-                                       const DetectionSettings& detection,
-                                       const VerdictSettings& verdict, bool sensitivity,
-                                       const bp::object& progress, int threads, int lanes) {
-  return std::make_shared<Examiner>(robot, cutoff, flat_horizontal_ground, omega, detection,
-                                    verdict, sensitivity, progress, threads, lanes);
+Examination examine(const MotionExaminer& examiner, const RecordedMotion& recorded) {
+  const WithoutLock without_lock;
+  return examiner.examine(recorded);
 }
 
 }  // namespace
@@ -85,7 +73,7 @@ void exposeMotionExamination() {
       .def(CopyVisitor<Examination>());
 
   const ExaminationSettings defaults;
-  bp::class_<Examiner, std::shared_ptr<Examiner>, boost::noncopyable>(
+  bp::class_<MotionExaminer, std::shared_ptr<MotionExaminer>>(
       "MotionExaminer",
       "Judges recorded motions of one robot, a DynaCoM, which is copied: deriveMotion,\n"
       "computeContactMotions, estimateGround, detectContacts unless a schedule was recorded,\n"
@@ -108,10 +96,11 @@ void exposeMotionExamination() {
            "called now and then with what part of the frames is analysed; the others as in the\n"
            "functions named above. Raises ValueError if one is out of its range, NotReadyError\n"
            "before the robot's initialize().")
-      .def("examine", &Examiner::examine, (bp::arg("self"), bp::arg("recorded")),
+      .def("examine", &examine, (bp::arg("self"), bp::arg("recorded")),
            "The MotionExamination of a RecordedMotion, whatever was examined before. Raises\n"
            "ValueError if the motion or its schedule is not valid.")
-      .def(PrintVisitor<Examiner>(&writeExaminer));
+      .def(PrintVisitor<MotionExaminer>(&writeExaminer))
+      .def(CopyVisitor<MotionExaminer>());
 }
 
 }  // namespace dynacom::python

@@ -2,31 +2,15 @@
 """Lesson 4. Is a motion possible? Configurations in, a verdict out."""
 
 import numpy as np
-import pinocchio
+from crouch import crouch
 
 import dynacom
 
 talos = dynacom.load_robot("talos").dynacom()
 model = talos.getModel()
-rest = np.zeros(model.nv)
-
-
-def crouch(period):
-    """Configurations of two crouches, 100 a second, with the feet where they are."""
-    time = np.arange(int(200 * period) + 1) / 100
-    q = np.tile(pinocchio.neutral(model), (len(time), 1))
-    for row, t in zip(q, time, strict=True):
-        bend = 0.2 + 0.3 * (1 - np.cos(2 * np.pi * t / period))
-        for side in "left", "right":
-            for joint, angle in (3, -bend), (4, 2 * bend), (5, -bend):
-                row[model.idx_qs[model.getJointId(f"leg_{side}_{joint}_joint")]] = angle
-        talos.computeDynamics(row, rest, rest)
-        row[:3] -= talos.getContact("left_sole").getSurfacePose().translation
-    return time, q
-
 
 for period in 2.0, 0.5:
-    time, q = crouch(period)
+    time, q = crouch(talos, period)
 
     # Velocities and accelerations, without what is faster than 6 Hz.
     smooth = dynacom.filterConfigurations(model, q, rate=100.0, cutoff=6.0)

@@ -94,6 +94,9 @@ MotionExaminer::MotionExaminer(const DynaCoM& robot, const ExaminationSettings& 
   office_ = std::make_unique<Office>(robot, settings);
 }
 
+MotionExaminer::MotionExaminer(const MotionExaminer& other)
+    : office_(std::make_unique<Office>(other.office_->robot, other.office_->settings)) {}
+
 MotionExaminer::~MotionExaminer() = default;
 MotionExaminer::MotionExaminer(MotionExaminer&&) noexcept = default;
 MotionExaminer& MotionExaminer::operator=(MotionExaminer&&) noexcept = default;

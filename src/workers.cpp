@@ -116,10 +116,10 @@ void Workers::forEach(Eigen::Index count, const std::function<Work()>& makeWork,
 // So that there are that many, as far as there may be.
 void Workers::start(Eigen::Index others) {
   const std::size_t wanted = std::min(others_, static_cast<std::size_t>(others));
+  // Where the machine gives no more threads, or memory for them, those that there are do the work.
   try {
     while (threads_.size() < wanted) threads_.emplace_back([this] { serve(); });
   } catch (const std::system_error&) {
-    // The machine gives no more threads: those that there are do the work.
   } catch (const std::bad_alloc&) {
   }
 }

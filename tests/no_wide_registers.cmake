@@ -6,7 +6,7 @@ find_program(OBJDUMP objdump REQUIRED)
 find_program(NM nm REQUIRED)
 execute_process(COMMAND ${OBJDUMP} -d --no-show-raw-insn ${LIBRARY}
   OUTPUT_VARIABLE code COMMAND_ERROR_IS_FATAL ANY)
-if(code MATCHES "%[yz]mm[0-9]")
+if(code MATCHES "%([yz]mm[0-9]|k[0-7][^0-9a-z]|xmm(1[6-9]|[23][0-9]))")
   message(FATAL_ERROR "${LIBRARY} uses ${CMAKE_MATCH_0}")
 endif()
 foreach(object ${LANES})

@@ -52,11 +52,11 @@ BOOST_AUTO_TEST_CASE(forces_are_parts_of_the_weight) {
   const MotionStatistics statistics = some.summarize();
   BOOST_TEST(statistics.frames == 4);
   BOOST_TEST(statistics.mass == 10.);
-  BOOST_TEST(statistics.weight == 98.1);
-  BOOST_TEST(statistics.mean_vertical_force == 105. / 98.1);
-  BOOST_TEST(statistics.momentum_change == 10. * 1.5 / 1.5 / 98.1);
-  BOOST_TEST(statistics.residual_force_rms == 2.5 / 98.1);
-  BOOST_TEST(statistics.residual_torque_rms == 5. / 98.1);
+  BOOST_TEST(close(statistics.weight, 98.1));
+  BOOST_TEST(close(statistics.mean_vertical_force, 105. / 98.1));
+  BOOST_TEST(close(statistics.momentum_change, 10. * 1.5 / 1.5 / 98.1));
+  BOOST_TEST(close(statistics.residual_force_rms, 2.5 / 98.1));
+  BOOST_TEST(close(statistics.residual_torque_rms, 5. / 98.1));
   BOOST_TEST(statistics.share(DistributionStatus::Solved) == 0.5);
   BOOST_TEST(statistics.share(DistributionStatus::Relaxed) == 0.25);
   BOOST_TEST(statistics.share(DistributionStatus::InvalidInput) == 0.);
@@ -70,7 +70,7 @@ BOOST_AUTO_TEST_CASE(a_jump_gives_what_it_ends_with_in_momentum) {
   const double rate = 200.;
   const auto t = VectorXd::LinSpaced(frames, 0., double(frames - 1) / rate).eval();
   some.motion.time = t;
-  some.motion.q.row(2) = 1. + (t.array() * 3.).sin() * 0.1;
+  some.motion.q.row(2) = 1. + (t.array() * 1.3).sin() * 0.1;
   const Motion moved = differentiate(some.model, t, some.motion.q);
   const ContactSchedule schedule{some.robot.getKnownContacts(),
                                  ContactSchedule::Matrix::Constant(2, frames, true)};
@@ -85,10 +85,12 @@ BOOST_AUTO_TEST_CASE(without_gravity_forces_are_parts_of_the_weight_on_earth) {
   Case some;
   some.model.gravity.linear().setZero();
   some.robot.initialize(some.model);
-  BOOST_TEST(summarizeMotion(some.robot, some.motion, some.analysis, some.verdict).weight == 98.1);
+  BOOST_TEST(
+      close(summarizeMotion(some.robot, some.motion, some.analysis, some.verdict).weight, 98.1));
   some.model.gravity.linear() << 0., 0., -1.62;
   some.robot.initialize(some.model);
-  BOOST_TEST(summarizeMotion(some.robot, some.motion, some.analysis, some.verdict).weight == 16.2);
+  BOOST_TEST(
+      close(summarizeMotion(some.robot, some.motion, some.analysis, some.verdict).weight, 16.2));
 }
 
 BOOST_AUTO_TEST_CASE(the_mean_residual_is_in_the_headings_axes) {
@@ -119,9 +121,9 @@ BOOST_AUTO_TEST_CASE(contacts_have_their_own) {
   ContactStatistics statistics = some.summarize().contacts.at(1);
   BOOST_TEST(statistics.name == "sole1");
   BOOST_TEST(statistics.active_share == 0.5);
-  BOOST_TEST(statistics.weight_share == 25. / 98.1);
-  BOOST_TEST(statistics.weight_share_while_active == 50. / 98.1);
-  BOOST_TEST(statistics.largest_vertical_force == 60. / 98.1);
+  BOOST_TEST(close(statistics.weight_share, 25. / 98.1));
+  BOOST_TEST(close(statistics.weight_share_while_active, 50. / 98.1));
+  BOOST_TEST(close(statistics.largest_vertical_force, 60. / 98.1));
   BOOST_TEST(statistics.largest_friction_usage == 0.9);
   BOOST_TEST(statistics.least_cop_margin == 0.03);
 

@@ -59,9 +59,11 @@ class DYNACOM_EXPORT MotionExaminer {
   /// @throws std::invalid_argument if settings are not valid; NotReadyError before the robot's
   ///         initialize()
   explicit MotionExaminer(const DynaCoM& robot, const ExaminationSettings& settings = {});
-  ~MotionExaminer();
+  /// A copy has threads and a robot of its own.
+  MotionExaminer(const MotionExaminer& other);
   MotionExaminer(MotionExaminer&&) noexcept;
   MotionExaminer& operator=(MotionExaminer&&) noexcept;
+  ~MotionExaminer();
 
   const ExaminationSettings& getSettings() const;
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """What a motion asks of the ground, frame by frame and as a whole."""
 
+import copy
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -290,7 +291,7 @@ def analyze(
             ``kMaximalCutoff`` of the frame rate, or the frame rate is not even.
         ValueError: options are out of their ranges.
     """
-    options = options or AnalysisOptions()
+    options = AnalysisOptions() if options is None else copy.deepcopy(options)
     options.validate()
     if not isinstance(robot, Robot):
         robot = load_robot(robot)

@@ -22,6 +22,7 @@ def test_there_are_examples():
         "02_force_distribution",
         "03_control_loop",
         "04_motion",
+        "05_many_motions",
     ]
 
 

@@ -539,7 +539,7 @@ def test_uneven_times(talos, bare):
     uneven = replace(bare, time=time)
     message = (
         "times must be evenly spaced to be filtered, got steps from 0.02 to 0.03 s; without a "
-        "filter (--cutoff 0) they need not be"
+        "filter (cutoff 0) they need not be"
     )
     with pytest.raises(DynacomError, match=re.escape(f"talos_walk.npz: {message}")):
         analyze(uneven, talos)
@@ -829,7 +829,7 @@ def test_a_payload_is_carried(talos, walk, report):
 def test_progress(talos, bare, walk):
     for clip in (bare, walk):
         parts = []
-        analyze(clip, talos, progress=parts.append)
+        analyze(clip, talos, threads=1, progress=parts.append)
         assert parts == sorted(parts)
         assert parts[0] > 0.0 and parts[-1] == 1.0
         # Each cut-off is as much work.

@@ -24,6 +24,7 @@ from dynacom import (
     DynacomError,
     Motion,
     analyzeMotion,
+    computeContactMotions,
     countLanes,
 )
 from dynacom.robots import (
@@ -160,13 +161,21 @@ def test_lanes(name, flat):
             assert_same(one.wrench / weight, other.wrench / weight)
             for key in ("cop", "friction_usage", "yaw_usage", "cop_margin"):
                 assert_same(getattr(one, key), getattr(other, key))
+        placed, alone = (
+            computeContactMotions(dynamics, motion, lanes=number) for number in (lanes, 1)
+        )
+        for one, other in zip(placed, alone, strict=True):
+            for key in ("position", "rotation", "height", "velocity"):
+                assert_same(getattr(one, key), getattr(other, key))
 
 
 def test_lanes_are_there():
     """Where Linux says that the processor has them."""
     cpuinfo = Path("/proc/cpuinfo")
     flags = set(re.findall(r"\w+", cpuinfo.read_text())) if cpuinfo.exists() else set()
-    lanes = 8 if "avx512f" in flags else 4 if {"avx2", "fma"} <= flags else 1
+    avx2 = {"avx2", "fma"}
+    avx512 = avx2 | {"avx512f", "avx512dq", "avx512vl", "avx512bw"}
+    lanes = 8 if avx512 <= flags else 4 if avx2 <= flags else 1
     for name in ROBOTS:
         assert countLanes(load_robot(name).dynacom()) == lanes
 

@@ -42,6 +42,9 @@ def objects(talos, talos_standing, talos_motion):
     analysis = dynacom.analyzeMotion(robot, motion, schedule)
     result = robot.getDistribution()
     report = dynacom.analyze(WALKS / "talos_walk.npz", talos)
+    recorded = dynacom.RecordedMotion(motion.time, motion.q)
+    examiner = dynacom.MotionExaminer(robot, sensitivity=True)
+    examination = examiner.examine(recorded)
     objects = [
         state,
         dynacom.computeGroundWrench(state, [0.0, 0.0, -9.81]),
@@ -73,6 +76,14 @@ def objects(talos, talos_standing, talos_motion):
         report,
         report.verdict,
         report.verdict.findings["quaternion"],
+        recorded,
+        examiner,
+        examination,
+        examination.derived,
+        examination.statistics,
+        examination.statistics.contacts[0],
+        examination.sensitivity[0],
+        dynacom.compareMeasured(motion.v, motion.v),
     ]
     return {type(value).__qualname__: value for value in objects} | {
         "DistributionResult.Contact": result.contacts[0],

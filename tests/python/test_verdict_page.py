@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dynacom
-from dynacom import AnalysisOptions, motion_report
+from dynacom import AnalysisOptions
 from helpers import WALKS
 
 
@@ -95,11 +95,11 @@ def test_the_summary_field_by_field(text, summary):
 def test_other_numbers(text):
     """Those in sentences."""
     words = " ".join(text.split())
-    assert f"off by at most {100 * motion_report._VELOCITY_MISMATCH:g} %" in words
-    assert f"the accelerations by at most {100 * motion_report._ACCELERATION_MISMATCH:g} %" in words
+    assert f"off by at most {100 * dynacom.kVelocityMismatch:g} %" in words
+    assert f"the accelerations by at most {100 * dynacom.kAccelerationMismatch:g} %" in words
     assert f"below {dynacom.kMaximalCutoff:g} of the frame rate" in words
     assert f"{AnalysisOptions().cutoff:g} Hz by default" in words
-    assert motion_report._EVEN == 0.1
+    assert dynacom.kEvenTimes == 0.1
     assert "up to a tenth of a frame away" in words
 
 
