@@ -31,13 +31,15 @@ def main():
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--counts", action="store_true")
     what.add_argument("--jitter", type=float, metavar="MINUTES")
+    what.add_argument("--batch", action="store_true")
     what.add_argument("--plots", action="store_true")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--record", action="store_true")
     arguments = parser.parse_intermixed_args()
-    if arguments.regex and (arguments.record or arguments.jitter or arguments.plots):
-        parser.error("a REGEX goes with neither --record, --jitter nor --plots")
+    others = arguments.record, arguments.jitter, arguments.batch, arguments.plots
+    if arguments.regex and any(others):
+        parser.error("a REGEX goes with neither --record, --jitter, --batch nor --plots")
 
     if arguments.plots:
         page.write()
@@ -45,6 +47,11 @@ def main():
     if arguments.jitter:
         part, result = "jitter", measure.jitter(arguments.jitter)
         print(page.jitter_conditions(result), page.jitter_table(result), sep="\n")
+    elif arguments.batch:
+        import batch  # needs DynaCoM, which the page does not
+
+        part, result = "batch", batch.measure(arguments.quick)
+        print(*page.batch_blocks(result).values(), sep="\n\n")
     else:
         default = "|".join(map(re.escape, page.GOAL_TABLE)) if arguments.counts else ""
         regex = arguments.regex or re.compile(default)

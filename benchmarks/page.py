@@ -77,6 +77,18 @@ GOAL_TABLE = {
     "analyzeMotion/2 threads": ("two threads, one clip of 16,384 frames, G1", round(1 / 1.9, 3)),
     "analyzeMotions/2 threads": ("two threads, 64 clips of 300 frames, G1", round(1 / 1.9, 3)),
 }
+# Of batches: what rows are called; their goal and whether that is to be reached or not exceeded.
+BATCH_TABLE = {
+    "command": ("`dynacom batch --jobs 2`, from its start to its end", (">=", 150_000)),
+    "two": ("the same, from the first result to the last", (">=", 150_000)),
+    "one worker": ("with `--jobs 1`", None),
+    "one core": ("with `--jobs 1`, all on one core", None),
+    "two workers over one": ("two workers over one", None),
+    "two cores over one": ("two cores over one", (">=", 1.9)),
+    "parent": ("peak memory of {more} clips over {few}: of the command", ("<=", 1.1)),
+    "worker": ("peak memory of {more} clips over {few}: of the larger worker", ("<=", 1.1)),
+    "ray": ("time of `--engine ray` over `--engine local`", ("<=", 1.5)),
+}
 GOALS = {name: goal for name, (_, goal) in GOAL_TABLE.items() if goal}
 
 
@@ -284,6 +296,109 @@ def jitter_conditions(jitter):
     )
 
 
+def batch_values(batch):
+    """{name: value} of what there are goals for."""
+    rates = batch["rates"]
+    few, more = batch["memory"][0], batch["memory"][1]
+    values = {
+        **rates,
+        "two workers over one": rates["two"] / rates["one worker"],
+        "two cores over one": rates["two"] / rates["one core"],
+        **{process: more[process] / few[process] for process in ("parent", "worker")},
+    }
+    if engines := batch.get("engines"):
+        values["ray"] = engines["local"]["rate"] / engines["ray"]["rate"]
+    return values
+
+
+def batch_table(batch):
+    values = batch_values(batch)
+    numbers = {"few": batch["memory"][0]["clips"], "more": batch["memory"][1]["clips"]}
+    lines = []
+    for name, (what, goal) in BATCH_TABLE.items():
+        value, shown_goal = values.get(name), ""
+        if value is None:
+            shown = "not measured"
+        else:
+            shown = f"{value:,.0f} frames/s" if name in batch["rates"] else f"{value:.2f}"
+        if goal:
+            relation, limit = goal
+            shown_goal = f"{'≥' if relation == '>=' else '≤'} {limit:,g}"
+            if value is not None and (value < limit if relation == ">=" else value > limit):
+                shown = f"**{shown}**"
+        lines.append((what.format_map(numbers), shown, shown_goal))
+    return markdown(("what", "measured", "goal"), lines)
+
+
+def batch_conditions(batch):
+    of = batch["clips"]
+    shares = {name: f"{100 * value:.0f} %" for name, value in of.items() if name != "number"}
+    return (
+        f"{of['number']:,} clips of 10 s at 30 fps, {shares['feasible']} of them feasible; of "
+        f"their frames {shares['solved']} are `Solved`, {shares['relaxed']} `Relaxed`, "
+        f"{shares['no_contact']} `NoContact`. {batch['lanes']} lanes; medians of "
+        f"{batch['repetitions']} runs. The first result came {batch['starting_s']:.2f} s after the "
+        f"start, and the process ended {batch['ending_s']:.2f} s after the last."
+    )
+
+
+def shares_table(batch):
+    shares = batch["shares"]
+    total = sum(shares.values())
+    lines = [
+        (step, f"{1e3 * seconds:.2f} ms", f"{100 * seconds / total:.0f} %")
+        for step, seconds in shares.items()
+    ]
+    lines.append(("all of these", f"{1e3 * total:.2f} ms", "100 %"))
+    lines.append(("the batch itself, without start-up", f"{1e3 * batch['cpu_s']:.2f} ms", ""))
+    return markdown(("step", "time a clip", "share"), lines)
+
+
+def readers_table(batch):
+    lines = [(name, f"{1e3 * seconds:.2f} ms") for name, seconds in batch["readers"].items()]
+    return markdown(("reader", "time a clip"), lines)
+
+
+def memory_table(batch):
+    rows = list(batch["memory"])
+    if engines := batch.get("engines"):
+        rows.append(engines["local"])
+    lines = [
+        (f"{row['clips']:,}", *(f"{row[name] / 1024:.0f} MiB" for name in ("parent", "worker")))
+        for row in rows
+    ]
+    return markdown(("clips", "the command", "the larger worker"), lines)
+
+
+def engines_table(batch):
+    lines = [
+        (
+            engine,
+            f"{run['clips']:,}",
+            f"{run['starting']:.1f} s",
+            f"{run['working']:.1f} s",
+            f"{run['rate']:,.0f}",
+            f"{run['ending']:.1f} s",
+        )
+        for engine, run in batch["engines"].items()
+    ]
+    header = ("engine", "clips", "to the first result", "to the last", "frames/s", "to the end")
+    return markdown(header, lines)
+
+
+def batch_blocks(batch):
+    """All that the page says of batches, block by block."""
+    blocks = {
+        "batch": f"{batch_conditions(batch)}\n\n{batch_table(batch)}",
+        "batch_shares": shares_table(batch),
+        "batch_readers": readers_table(batch),
+        "batch_memory": memory_table(batch),
+    }
+    measured = "engines" in batch
+    blocks["batch_engines"] = engines_table(batch) if measured else "Ray was not installed."
+    return blocks
+
+
 def provenance(part):
     rough = ", roughly (`--quick`)" if part["rough"] else ""
     return f"Measured on {part['date']}{rough}: {part['machine']}."
@@ -312,6 +427,9 @@ def write():
     if jitter := parts.get("jitter"):
         conditions = f"{provenance(jitter)} {jitter_conditions(jitter)}"
         blocks["jitter"] = f"{conditions}\n\n{jitter_table(jitter)}"
+    if batch := parts.get("batch"):
+        blocks.update(batch_blocks(batch))
+        blocks["batch"] = f"{provenance(batch)} {blocks['batch']}"
 
     path = DOCS / "performance.md"
     text = path.read_text()
