@@ -25,6 +25,7 @@ void exposeContactPoint();
 void exposeContact6D();
 void exposeWrenchDistribution();
 void exposeDynaCoM();
+void exposeNumberTable();
 void exposeMotion();
 void exposeContactSchedule();
 void exposeRecordedMotion();

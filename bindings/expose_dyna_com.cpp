@@ -225,6 +225,9 @@ void exposeDynaCoM() {
            "getDistribution() has all.\n\n"
            "groundCoMForce: (3,) [N]; groundCoMTorque: (3,), about the centre of mass [N·m];\n"
            "com: (3,), that of getCoM(), or getFeasibleAMVariation() means nothing [m].")
+      .def("forgetAnswers", &DynaCoM::forgetAnswers, bp::arg("self"),
+           "Forgets which inequalities were active, and forces that would be kept: the next\n"
+           "distribution starts cold, and does not depend on those before.")
       .def(
           "getDistribution", &DynaCoM::getDistribution, bp::arg("self"), Copied(),
           "The last distribution, be it distributeForce()'s or that of computeDynamics on uneven\n"

@@ -57,7 +57,7 @@ void exposeMotionExamination() {
       .def(CopyVisitor<CutoffSensitivity>());
 
   bp::class_<Examination>("MotionExamination",
-                          "All that was found of a recorded motion, see examineMotion.",
+                          "All that was found of a recorded motion, see MotionExaminer.",
                           bp::no_init)
       .def_readonly("derived", &Examination::derived, "The DerivedMotion")
       .add_property("contacts", &getContacts, "A ContactMotion for each contact")

@@ -36,11 +36,9 @@ std::shared_ptr<FaultLimit> makeLimit(double limit, double allowed_share) {
   return std::make_shared<FaultLimit>(FaultLimit{limit, allowed_share});
 }
 
-MotionVerdict judge(const DynaCoM& robot, const Motion& motion, const Eigen::MatrixXd& recorded_q,
-                    const Eigen::VectorXd& quaternion_error, const bp::object& contacts,
-                    const Eigen::VectorXd& ground, const MotionAnalysis& analysis,
-                    const VerdictSettings& settings, int threads) {
-  const RecordedMotion recorded{motion.time, recorded_q.transpose(), quaternion_error};
+MotionVerdict judge(const DynaCoM& robot, const Motion& motion, const RecordedMotion& recorded,
+                    const bp::object& contacts, const Eigen::VectorXd& ground,
+                    const MotionAnalysis& analysis, const VerdictSettings& settings, int threads) {
   const auto own_contacts = toVectorOf<ContactMotion>(contacts);
   const DynaCoM own_robot(robot);  // without the lock, others may change it and the settings
   const VerdictSettings own_settings(settings);
@@ -109,13 +107,13 @@ void exposeMotionVerdict() {
 
   bp::def(
       "judgeMotion", &judge,
-      (bp::arg("robot"), bp::arg("motion"), bp::arg("recorded_q"), bp::arg("quaternion_error"),
-       bp::arg("contacts"), bp::arg("ground"), bp::arg("analysis"),
-       bp::arg("settings") = VerdictSettings(), bp::arg("threads") = 0),
+      (bp::arg("robot"), bp::arg("motion"), bp::arg("recorded"), bp::arg("contacts"),
+       bp::arg("ground"), bp::arg("analysis"), bp::arg("settings") = VerdictSettings(),
+       bp::arg("threads") = 0),
       "Judges a motion, for which computeContactMotions, estimateGround and analyzeMotion have\n"
-      "been called. recorded_q: configurations before any filter, (T, nq); quaternion_error:\n"
-      "how far the norm of the root's was from 1 in the record, (T,); threads as in\n"
-      "analyzeMotion. Raises ValueError if settings or motion are not valid, or sizes differ.");
+      "been called. recorded: the RecordedMotion before any filter, of which q and\n"
+      "quaternion_error are looked at; threads as in analyzeMotion. Raises ValueError if settings\n"
+      "or motion are not valid, or sizes differ.");
 }
 
 }  // namespace dynacom::python

@@ -239,6 +239,9 @@ void exposeWrenchDistribution() {
           "DistributionStatus.")
       .def("result", &WrenchDistribution::result, bp::arg("self"), Copied(),
            "The last solve()'s DistributionResult, a copy.")
+      .def("forgetAnswers", &WrenchDistribution::forgetAnswers, bp::arg("self"),
+           "Forgets which inequalities were active, and forces that would be kept: the next\n"
+           "solve() starts cold, and does not depend on those before.")
       .def("forgetForces", &WrenchDistribution::forgetForces, bp::arg("self"),
            "Forgets the forces that a solve() without an answer would keep: until there is one\n"
            "again, they are zero.")

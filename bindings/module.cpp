@@ -35,6 +35,7 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeContact6D();
   exposeWrenchDistribution();
   exposeDynaCoM();
+  exposeNumberTable();
   exposeMotion();
   exposeContactSchedule();
   exposeRecordedMotion();

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """Lesson 4. Is a motion possible? Configurations in, a verdict out."""
 
-import numpy as np
 from crouch import crouch
 
 import dynacom
@@ -23,7 +22,8 @@ for period in 2.0, 0.5:
     analysis = dynacom.analyzeMotion(talos, motion, schedule)
 
     # And is that enough?
-    verdict = dynacom.judgeMotion(talos, motion, q, np.zeros(len(time)), contacts, ground, analysis)
+    recorded = dynacom.RecordedMotion(time, q)
+    verdict = dynacom.judgeMotion(talos, motion, recorded, contacts, ground, analysis)
     largest = analysis.ground_force[:, 2].max() / (talos.getMass() * 9.81)
     share = 100 * schedule.active.mean()
     print(f"A crouch in {period:.1f} s: {'feasible' if verdict.feasible else 'not feasible'}")

@@ -32,7 +32,7 @@ std::shared_ptr<DynaCoM> Desks::take() {
 
 void Desks::clear(DynaCoM& robot) {
   for (const std::string& name : robot.getActiveContacts()) robot.deactivateContact(name);
-  robot.forgetDistributions();
+  robot.forgetAnswers();
 }
 
 }  // namespace dynacom::internal

@@ -13,12 +13,11 @@
 
 namespace dynacom {
 
+using internal::requireTime;
 using internal::throwInvalid;
 
 namespace {
 
-// How far a quaternion's norm may be from 1: files are often rounded to a few digits.
-constexpr double kNormalized = 1e-3;
 // What mismatches of derivatives are a part of at least: [m/s, rad/s], [m/s², rad/s²].
 constexpr double kLeastVelocity = 0.05, kLeastAcceleration = 0.5;
 
@@ -31,17 +30,6 @@ void requireFrames(const char* name, const Eigen::MatrixXd& values, Eigen::Index
       throwInvalid(name, " must be finite, got another number in frame ", frame);
 }
 
-void requireTime(const Eigen::VectorXd& time) {
-  if (time.size() == 0) throwInvalid("time must have at least one frame, got 0");
-  for (Eigen::Index frame = 0; frame < time.size(); ++frame) {
-    if (!std::isfinite(time[frame]))
-      throwInvalid("time must be finite, got ", time[frame], " in frame ", frame);
-    if (frame > 0 && !(time[frame] > time[frame - 1]))
-      throwInvalid("time must increase, got ", time[frame - 1], " s and then ", time[frame],
-                   " s in frame ", frame);
-  }
-}
-
 void requireConfigurations(const pinocchio::Model& model, const Eigen::MatrixXd& q,
                            Eigen::Index frames) {
   requireFrames("q", q, model.nq, "components (nq)", frames);
@@ -51,7 +39,9 @@ void requireConfigurations(const pinocchio::Model& model, const Eigen::MatrixXd&
       throwInvalid("q must have quaternions of norm 1, got another in frame ", frame);
 }
 
-// Components of configurations that are numbers, each on its own: joints, and places in the world.
+// Components of configurations, by how they move.
+
+// Numbers, each on its own: joints, and places in the world.
 struct Numbers {
   std::vector<Eigen::Index> components;
 
@@ -66,8 +56,36 @@ struct Numbers {
   }
 };
 
-// The others: a model of nothing but the joints that turn.
-struct Turns {
+// Quaternions.
+struct Rotations {
+  std::vector<Eigen::Index> components;
+
+  Eigen::Index count() const { return Eigen::Index(components.size()) / 4; }
+  Eigen::Index size() const { return 3 * count(); }
+  void difference(const Eigen::VectorXd& from, const Eigen::VectorXd& to,
+                  Eigen::VectorXd& step) const {
+    for (Eigen::Index k = 0; k < count(); ++k) {
+      const Eigen::Quaterniond turned = read(from, k).conjugate() * read(to, k);
+      step.segment<3>(3 * k) = pinocchio::quaternion::log3(turned);
+    }
+  }
+  void integrate(const Eigen::VectorXd& from, const Eigen::VectorXd& step,
+                 Eigen::VectorXd& to) const {
+    Eigen::Quaterniond turned;
+    for (Eigen::Index k = 0; k < count(); ++k) {
+      pinocchio::quaternion::exp3(step.segment<3>(3 * k), turned);
+      to.segment<4>(4 * k) = (read(from, k) * turned).normalized().coeffs();
+    }
+  }
+
+ private:
+  static Eigen::Map<const Eigen::Quaterniond> read(const Eigen::VectorXd& numbers, Eigen::Index k) {
+    return Eigen::Map<const Eigen::Quaterniond>(numbers.data() + 4 * k);
+  }
+};
+
+// All others: a model of nothing but these joints.
+struct Others {
   std::vector<Eigen::Index> components;
   pinocchio::Model model;
 
@@ -86,23 +104,25 @@ struct Turns {
 // Takes the configurations of a model apart. The steps of a free-flyer are those of its place in
 // the world and of its orientation, independently: a body that flies straight on while it turns
 // does so for the filter, too.
-void separate(const pinocchio::Model& model, Numbers& numbers, Turns& turns) {
+void separate(const pinocchio::Model& model, Numbers& numbers, Rotations& rotations,
+              Others& others) {
   const auto take = [](std::vector<Eigen::Index>& components, int first, int size) {
     for (int i = 0; i < size; ++i) components.push_back(first + i);
   };
   for (std::size_t k = 1; k < static_cast<std::size_t>(model.njoints); ++k) {
     const pinocchio::JointModel& joint = model.joints[k];
     const int first = joint.idx_q();
-    const pinocchio::SE3 placement = pinocchio::SE3::Identity();
+    const std::string name = joint.shortname();
     if (joint.nq() == joint.nv()) {
       take(numbers.components, first, joint.nq());
-    } else if (joint.shortname() == pinocchio::JointModelFreeFlyer::classname()) {
+    } else if (name == pinocchio::JointModelFreeFlyer::classname()) {
       take(numbers.components, first, 3);
-      take(turns.components, first + 3, 4);
-      turns.model.addJoint(0, pinocchio::JointModelSpherical(), placement, model.names[k]);
+      take(rotations.components, first + 3, 4);
+    } else if (name == pinocchio::JointModelSpherical::classname()) {
+      take(rotations.components, first, 4);
     } else {
-      take(turns.components, first, joint.nq());
-      turns.model.addJoint(0, joint, placement, model.names[k]);
+      take(others.components, first, joint.nq());
+      others.model.addJoint(0, joint, pinocchio::SE3::Identity(), model.names[k]);
     }
   }
 }
@@ -147,6 +167,19 @@ struct Section {
       q.col(frame) = y;
     }
   }
+
+  // The same for numbers, in one go.
+  void filter(const Numbers&, Eigen::MatrixXd& q) const {
+    Eigen::VectorXd x = q.col(0), x1 = x, x2 = x, y1 = x, y2 = x;
+    for (Eigen::Index frame = 0; frame < q.cols(); ++frame) {
+      x = q.col(frame);
+      y2 = y1 + a2 * (y1 - y2) + b * ((x - y1) + 2. * (x1 - y1) + (x2 - y1));
+      y2.swap(y1);
+      x2.swap(x1);
+      x1.swap(x);
+      q.col(frame) = y1;
+    }
+  }
 };
 
 // Filters some components, which lie in a space of their own, forward and backward.
@@ -186,50 +219,6 @@ void filterComponents(const Space& space, double rate, double cutoff, Eigen::Mat
 
 }  // namespace
 
-namespace internal {
-
-MotionCheck::MotionCheck(const pinocchio::Model& model) : model_(model) {
-  for (std::size_t k = 1; k < static_cast<std::size_t>(model.njoints); ++k) {
-    const pinocchio::JointModel& joint = model.joints[k];
-    if (joint.nq() == joint.nv()) continue;
-    const std::string name = joint.shortname();
-    if (name == pinocchio::JointModelFreeFlyer::classname())
-      circles_.push_back({joint.idx_q() + 3, 4});
-    else if (name == pinocchio::JointModelPlanar::classname())
-      circles_.push_back({joint.idx_q() + 2, 2});
-    else if (joint.nv() == 1 || name == pinocchio::JointModelSpherical::classname())
-      circles_.push_back({joint.idx_q(), joint.nq()});
-    else
-      is_known_ = false;
-  }
-}
-
-bool MotionCheck::hasSizes(const Motion& motion) const {
-  const Eigen::Index frames = motion.frames();
-  if (frames == 0 || motion.q.rows() != model_.nq || motion.q.cols() != frames) return false;
-  for (const Eigen::MatrixXd* values : {&motion.v, &motion.a})
-    if (values->rows() != model_.nv || values->cols() != frames) return false;
-  if (!areFinite(motion.time)) return false;
-  for (Eigen::Index frame = 1; frame < frames; ++frame)
-    if (!(motion.time[frame] > motion.time[frame - 1])) return false;
-  return true;
-}
-
-bool MotionCheck::isConfiguration(const Eigen::Ref<const Eigen::VectorXd>& q) const {
-  if (!areFinite(q)) return false;
-  if (!is_known_) return pinocchio::isNormalized(model_, q, kNormalized);
-  for (const Circle& circle : circles_)
-    if (!(std::abs(q.segment(circle.first, circle.size).norm() - 1.) <= kNormalized)) return false;
-  return true;
-}
-
-bool MotionCheck::isValid(const Motion& motion, Eigen::Index frame) const {
-  return isConfiguration(motion.q.col(frame)) && areFinite(motion.v.col(frame)) &&
-         areFinite(motion.a.col(frame));
-}
-
-}  // namespace internal
-
 void Motion::validate(const pinocchio::Model& model) const {
   requireTime(time);
   requireConfigurations(model, q, frames());
@@ -249,11 +238,13 @@ Eigen::MatrixXd filterConfigurations(const pinocchio::Model& model, const Eigen:
   if (frames < 2) return q;
 
   Numbers numbers;
-  Turns turns;
-  separate(model, numbers, turns);
+  Rotations rotations;
+  Others others;
+  separate(model, numbers, rotations, others);
   Eigen::MatrixXd filtered = q;
   filterComponents(numbers, rate, cutoff, filtered);
-  filterComponents(turns, rate, cutoff, filtered);
+  filterComponents(rotations, rate, cutoff, filtered);
+  filterComponents(others, rate, cutoff, filtered);
   return filtered;
 }
 
@@ -295,9 +286,9 @@ Motion differentiate(const pinocchio::Model& model, const Eigen::VectorXd& time,
 DerivativeMismatch compareDerivatives(const pinocchio::Model& model, const Motion& motion) {
   motion.validate(model);
   // Apart, because joints move more than the root, of which a little error is a large force.
-  const bool flies = model.njoints > 1 && model.joints[1].nv() == 6;
-  const std::vector<Eigen::Index> begins =
-      flies ? std::vector<Eigen::Index>{0, 3, 6, model.nv} : std::vector<Eigen::Index>{0, model.nv};
+  const std::vector<Eigen::Index> begins = internal::hasFreeFlyer(model)
+                                               ? std::vector<Eigen::Index>{0, 3, 6, model.nv}
+                                               : std::vector<Eigen::Index>{0, model.nv};
 
   // Mean squares of a part: of what does not fit, and of the derivatives themselves.
   struct Part {

@@ -9,6 +9,13 @@
 
 namespace dynacom::internal {
 
+/// Whether the first joint is a free-flyer: the first seven components of configurations are then
+/// its place and its quaternion, and the first six of velocities its own.
+bool hasFreeFlyer(const pinocchio::Model& model);
+
+/// @throws std::invalid_argument unless there is a frame, and times are finite and increase
+void requireTime(const Eigen::VectorXd& time);
+
 /// Looks at motions frame by frame, fast, for what Motion::validate() would refuse, and says no
 /// more than that.
 class MotionCheck {

@@ -27,7 +27,8 @@ struct MotionExaminer::Office {
         desks(robot, given_settings.analysis.lanes),
         workers(given_settings.analysis.threads) {}
 
-  MotionExamination examine(const RecordedMotion& recorded);
+  MotionExamination examine(const RecordedMotion& recorded,
+                            const std::function<void(double)>& progress);
 
   const DynaCoM robot;
   const ExaminationSettings settings;
@@ -35,7 +36,8 @@ struct MotionExaminer::Office {
   internal::Workers workers;
 };
 
-MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded) {
+MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded,
+                                                  const std::function<void(double)>& progress) {
   MotionExamination found = {};
   found.derived = deriveMotion(robot.getModel(), recorded, settings.cutoff);
   const Motion& motion = found.derived.motion;
@@ -56,9 +58,9 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   const auto work = double(motion.frames()) * double(1 + cutoffs.size());
   AnalysisSettings analysis_settings = settings.analysis;
   analysis_settings.progress = nullptr;
-  if (settings.progress)
+  if (progress)
     analysis_settings.progress = [&](Eigen::Index frames) {
-      settings.progress(double(done + frames) / work);
+      progress(double(done + frames) / work);
     };
   const auto analyze = [&](const Motion& moved) {
     MotionAnalysis analysis = internal::analyzeMotion(desks, ground_height, moved, found.schedule,
@@ -99,12 +101,15 @@ MotionExaminer::MotionExaminer(const MotionExaminer& other)
 
 MotionExaminer::~MotionExaminer() = default;
 MotionExaminer::MotionExaminer(MotionExaminer&&) noexcept = default;
-MotionExaminer& MotionExaminer::operator=(MotionExaminer&&) noexcept = default;
+MotionExaminer& MotionExaminer::operator=(MotionExaminer other) noexcept {
+  office_.swap(other.office_);
+  return *this;
+}
 
 const ExaminationSettings& MotionExaminer::getSettings() const { return office_->settings; }
 
 MotionExamination MotionExaminer::examine(const RecordedMotion& recorded) const {
-  return office_->examine(recorded);
+  return office_->examine(recorded, office_->settings.progress);
 }
 
 MotionExamination examineMotion(const DynaCoM& robot, const RecordedMotion& recorded,
@@ -112,30 +117,38 @@ MotionExamination examineMotion(const DynaCoM& robot, const RecordedMotion& reco
   return MotionExaminer(robot, settings).examine(recorded);
 }
 
-void analyzeMotions(
-    const DynaCoM& robot, std::size_t clips, const std::function<RecordedMotion(std::size_t)>& read,
-    const std::function<void(std::size_t, const MotionExamination*, const std::string&)>& done,
-    const ExaminationSettings& settings) {
-  ExaminationSettings silent = settings;
-  silent.progress = nullptr;
-  const MotionExaminer examiner(robot, silent);
+void MotionExaminer::examineMany(
+    std::size_t clips, const std::function<RecordedMotion(std::size_t)>& read,
+    const std::function<void(std::size_t, const MotionExamination*, const std::string&)>& done)
+    const {
   std::mutex one_at_a_time;
+  bool ends = false;
   const auto examineClip = [&](Eigen::Index index) {
     const auto clip = static_cast<std::size_t>(index);
     std::optional<MotionExamination> found;
     std::string error;
     try {
-      found = examiner.examine(read(clip));
+      found = office_->examine(read(clip), nullptr);
     } catch (const std::exception& exception) {
       error = exception.what();
     } catch (...) {
       error = "unknown exception";
     }
     const std::lock_guard<std::mutex> lock(one_at_a_time);
+    if (ends) return;
+    ends = true;  // if the next throws
     done(clip, found ? &*found : nullptr, error);
+    ends = false;
   };
-  examiner.office_->workers.forEach(static_cast<Eigen::Index>(clips),
-                                    [&]() -> internal::Workers::Work { return examineClip; });
+  office_->workers.forEach(static_cast<Eigen::Index>(clips),
+                           [&]() -> internal::Workers::Work { return examineClip; });
+}
+
+void analyzeMotions(
+    const DynaCoM& robot, std::size_t clips, const std::function<RecordedMotion(std::size_t)>& read,
+    const std::function<void(std::size_t, const MotionExamination*, const std::string&)>& done,
+    const ExaminationSettings& settings) {
+  MotionExaminer(robot, settings).examineMany(clips, read, done);
 }
 
 }  // namespace dynacom

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "check.hpp"
+#include "motion_check.hpp"
 #include "nan.hpp"
 
 namespace dynacom {
@@ -46,7 +47,7 @@ ContactStatistics summarize(const MotionAnalysis::Contact& contact, double weigh
 MotionStatistics::Vector6 findMeanResidual(const pinocchio::Model& model, const Motion& motion,
                                            const MotionAnalysis& analysis,
                                            const MotionVerdict& verdict) {
-  const bool flies = model.njoints > 1 && model.joints[1].nv() == 6;
+  const bool flies = internal::hasFreeFlyer(model);
   const Eigen::VectorXd& missing = verdict[MotionFault::ContactMissing].measured;
   const Eigen::VectorXd& flight = verdict[MotionFault::FlightWithSupportNeeded].measured;
   MotionStatistics::Vector6 sum = MotionStatistics::Vector6::Zero();
@@ -69,9 +70,10 @@ MotionStatistics::Vector6 findMeanResidual(const pinocchio::Model& model, const 
 }
 
 double correlate(const Eigen::VectorXd& one, const Eigen::VectorXd& other) {
+  // Not by what is left of the mean: that rounds.
+  if (one.minCoeff() == one.maxCoeff() || other.minCoeff() == other.maxCoeff()) return kNaN;
   const Eigen::VectorXd a = one.array() - one.mean(), b = other.array() - other.mean();
-  const double size = a.norm() * b.norm();
-  return size > 0. ? a.dot(b) / size : kNaN;
+  return a.dot(b) / (a.norm() * b.norm());
 }
 
 }  // namespace
@@ -89,9 +91,12 @@ MotionStatistics summarizeMotion(const DynaCoM& robot, const Motion& motion,
   internal::requireSize("motion.q", motion.q.rows(), Eigen::Index(robot.getModel().nq),
                         "components (nq)");
   internal::requireSize("motion.q", motion.q.cols(), frames, "frames");
-  internal::requireSize("analysis", Eigen::Index(analysis.status.size()), frames, "frames");
-  internal::requireSize("verdict", verdict[MotionFault::ContactMissing].measured.size(), frames,
-                        "frames");
+  for (const Eigen::Index size : {Eigen::Index(analysis.status.size()), analysis.residual.cols(),
+                                  analysis.vcom.cols(), analysis.ground_force.cols()})
+    internal::requireSize("analysis", size, frames, "frames");
+  for (const MotionFault fault :
+       {MotionFault::ContactMissing, MotionFault::FlightWithSupportNeeded})
+    internal::requireSize("verdict", verdict[fault].measured.size(), frames, "frames");
   if (frames == 0) internal::throwInvalid("motion must have at least one frame, got 0");
 
   const double gravity = -robot.getSettings().gravity.z();

@@ -226,7 +226,10 @@ MotionVerdict internal::judgeMotion(Desks& desks, const Motion& motion,
     if (contacts[k].name != names[k] || analysis.contacts[k].name != names[k])
       throwInvalid("contacts must be those of the robot in its order: expected '", names[k],
                    "', got '", contacts[k].name, "' and '", analysis.contacts[k].name, "'");
-    internal::requireSize("contacts", contacts[k].height.size(), frames, "frames");
+    for (const Eigen::Index size : {contacts[k].height.size(), contacts[k].velocity.cols()})
+      internal::requireSize("contacts", size, frames, "frames");
+    internal::requireSize("analysis.contacts", analysis.contacts[k].active.size(), frames,
+                          "frames");
   }
 
   const double weight = robot.getMass() * kStandardGravity;

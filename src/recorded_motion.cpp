@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "check.hpp"
+#include "motion_check.hpp"
 #include "nan.hpp"
 
 namespace dynacom {
@@ -32,7 +33,7 @@ double largestStep(const Eigen::VectorXd& time) {
 
 double findFrameRate(const Eigen::VectorXd& time) {
   const Eigen::Index steps = time.size() - 1;
-  if (steps < 1) return kNaN;
+  if (steps < 1 || !internal::areFinite(time) || !(smallestStep(time) > 0.)) return kNaN;
   const double duration = time[steps] - time[0];
   const Eigen::VectorXd off = time - makeEven(time);
   const bool is_even =
@@ -42,6 +43,7 @@ double findFrameRate(const Eigen::VectorXd& time) {
 
 DerivedMotion rederiveMotion(const pinocchio::Model& model, const RecordedMotion& recorded,
                              double cutoff) {
+  internal::requireTime(recorded.time);
   DerivedMotion derived = {};
   derived.mismatch = {kNaN, kNaN};
   derived.frame_rate = findFrameRate(recorded.time);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "workers.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <atomic>
 #include <exception>
@@ -72,82 +74,91 @@ Workers::Workers(int threads)
     : others_(std::max(threads > 0 ? static_cast<unsigned>(threads)
                                    : std::thread::hardware_concurrency(),
                        1u) -
-              1u) {}
+              1u),
+      process_(getpid()),
+      pool_(std::make_unique<Pool>()) {}
 
 Workers::~Workers() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ends_ = true;
+  if (isForked()) {
+    static_cast<void>(
+        pool_.release());  // to end it would be to wait for threads of another process
+    return;
   }
-  changed_.notify_all();
-  for (std::thread& thread : threads_) thread.join();
+  {
+    const std::lock_guard<std::mutex> lock(pool_->mutex);
+    pool_->ends = true;
+  }
+  pool_->changed.notify_all();
+  for (std::thread& thread : pool_->threads) thread.join();
 }
+
+bool Workers::isForked() const { return getpid() != process_; }
 
 void Workers::forEach(Eigen::Index count, const std::function<Work()>& makeWork,
                       const std::function<void(Eigen::Index)>& progress) {
   if (count == 0) return;
   Loop loop(count, makeWork, progress);
-  if (count == 1 || others_ == 0) {
+  if (count == 1 || others_ == 0 || isForked()) {
     loop.work(true);
     loop.finish();
     return;
   }
+  Pool& pool = *pool_;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    start(count - 1);
-    loops_.push_back(&loop);
+    const std::lock_guard<std::mutex> lock(pool.mutex);
+    pool.start(std::min(others_, static_cast<std::size_t>(count - 1)));
+    pool.loops.push_back(&loop);
   }
-  changed_.notify_all();
+  pool.changed.notify_all();
   loop.work(true);
   {
-    std::unique_lock<std::mutex> lock(mutex_);
+    std::unique_lock<std::mutex> lock(pool.mutex);
     // Those that are still in it may have begun loops of their own, where there is something to do.
     while (loop.threads > 0) {
-      if (Loop* other = findLoop(&loop))
-        help(*other, lock);
+      if (Loop* other = pool.findLoop(&loop))
+        pool.help(*other, lock);
       else
-        changed_.wait(lock);
+        pool.changed.wait(lock);
     }
-    loops_.erase(std::find(loops_.begin(), loops_.end(), &loop));
+    pool.loops.erase(std::find(pool.loops.begin(), pool.loops.end(), &loop));
   }
   loop.finish();
 }
 
-// So that there are that many, as far as there may be.
-void Workers::start(Eigen::Index others) {
-  const std::size_t wanted = std::min(others_, static_cast<std::size_t>(others));
-  // Where the machine gives no more threads, or memory for them, those that there are do the work.
+// So that there are that many. Where the machine gives no more, or no memory for them, those that
+// there are do the work.
+void Workers::Pool::start(std::size_t wanted) {
   try {
-    while (threads_.size() < wanted) threads_.emplace_back([this] { serve(); });
+    while (threads.size() < wanted) threads.emplace_back([this] { serve(); });
   } catch (const std::system_error&) {
   } catch (const std::bad_alloc&) {
   }
 }
 
-void Workers::serve() {
-  std::unique_lock<std::mutex> lock(mutex_);
-  while (!ends_) {
+void Workers::Pool::serve() {
+  std::unique_lock<std::mutex> lock(mutex);
+  while (!ends) {
     if (Loop* loop = findLoop(nullptr))
       help(*loop, lock);
     else
-      changed_.wait(lock);
+      changed.wait(lock);
   }
 }
 
 // The last that began, behind another one if there is one: what lies within is done first.
-Loop* Workers::findLoop(const Loop* behind) const {
-  for (auto loop = loops_.rbegin(); loop != loops_.rend() && *loop != behind; ++loop)
+Loop* Workers::Pool::findLoop(const Loop* behind) const {
+  for (auto loop = loops.rbegin(); loop != loops.rend() && *loop != behind; ++loop)
     if ((*loop)->hasMore()) return *loop;
   return nullptr;
 }
 
-void Workers::help(Loop& loop, std::unique_lock<std::mutex>& lock) {
+void Workers::Pool::help(Loop& loop, std::unique_lock<std::mutex>& lock) {
   ++loop.threads;
   lock.unlock();
   loop.work(false);
   lock.lock();
   --loop.threads;
-  changed_.notify_all();
+  changed.notify_all();
 }
 
 void forEachBlock(Workers& workers, Eigen::Index frames, const std::function<BlockWork()>& makeWork,

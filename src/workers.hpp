@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <condition_variable>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -24,7 +25,8 @@ class Workers {
   explicit Workers(int threads);
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
-  /// Ends the threads. No loop may be left.
+  /// Ends the threads. No loop may be left. In a process that was forked meanwhile there are no
+  /// threads: there, the caller's does all the work.
   ~Workers();
 
   /// Does something with each item from 0 to count − 1.
@@ -37,17 +39,24 @@ class Workers {
                const std::function<void(Eigen::Index)>& progress = nullptr);
 
  private:
-  void start(Eigen::Index others);
-  void serve();
-  Loop* findLoop(const Loop* behind) const;
-  void help(Loop& loop, std::unique_lock<std::mutex>& lock);
+  struct Pool {
+    void start(std::size_t wanted);
+    void serve();
+    Loop* findLoop(const Loop* behind) const;
+    void help(Loop& loop, std::unique_lock<std::mutex>& lock);
+
+    std::mutex mutex;  // of all others
+    std::condition_variable changed;
+    std::vector<std::thread> threads;
+    std::vector<Loop*> loops;  // in the order in which they began
+    bool ends = false;
+  };
+
+  bool isForked() const;
 
   const std::size_t others_;  // how many threads there may be besides the caller's
-  std::vector<std::thread> threads_;
-  std::mutex mutex_;  // of all that follows, and of threads_
-  std::condition_variable changed_;
-  std::vector<Loop*> loops_;  // in the order in which they began
-  bool ends_ = false;
+  const int process_;         // that has them
+  std::unique_ptr<Pool> pool_;
 };
 
 /// How many frames make a block. Blocks do not depend on the number of threads, and each is begun

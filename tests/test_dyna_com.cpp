@@ -1906,6 +1906,38 @@ BOOST_AUTO_TEST_CASE(a_measurement_that_fails_is_a_status) {
 
 // --- Warm start ----------------------------------------------------------------------------------
 
+BOOST_AUTO_TEST_CASE(what_is_forgotten_has_no_influence) {
+  // Of what came before, bit for bit; nor has it if that is forgotten which is not there.
+  Random random(111);
+  for (int trial = 0; trial < 30; ++trial) {
+    const auto model = standingRobot(random, stance(3));
+    DynaCoM fresh(model);
+    fresh.addContact(makeSole("sole0"), "sole0");
+    fresh.addContact(makePoint("sole1"), "sole1");
+    fresh.addContact(makePoint("sole2"), "sole2", false);
+    const State rest = restState(model);
+    compute(fresh, rest, Vector6::Zero(), false);
+    DynaCoM used = fresh;
+    fresh.forgetAnswers();
+    for (int tick = 0; tick < 10; ++tick) {
+      if (tick % 3 == 1) used.activateContact("sole2");
+      compute(used, rest, random.vector(6, random.coin() ? 50. : 500.), false);
+      used.deactivateContact("sole2");
+    }
+    used.forgetAnswers();
+    const Vector6 external = random.vector(6, 300.);
+    for (DynaCoM* dynacom : {&fresh, &used}) {
+      // What has no answer keeps no forces.
+      compute(*dynacom, rest, Vector6::Constant(std::nan("")), false);
+      BOOST_TEST(dynacom->allForces().isZero(0.));
+      dynacom->forgetAnswers();
+      compute(*dynacom, rest, external, false);
+    }
+    BOOST_TEST(close(used.allForces(), fresh.allForces(), 0.));
+    BOOST_TEST(used.getDistribution().iterations == fresh.getDistribution().iterations);
+  }
+}
+
 BOOST_AUTO_TEST_CASE(how_distributions_iterate_is_a_setting) {
   Biped biped(112);
   DynaCoM& dynacom = biped.dynacom;

@@ -151,6 +151,14 @@ void checkLanes(const DynaCoM& robot, const Motion& motion, const ContactSchedul
         }
     }
     BOOST_TEST(rounds);
+    const auto placed = computeContactMotions(robot, motion, 1, lanes);
+    const auto alone = computeContactMotions(robot, motion, 1, 1);
+    for (std::size_t k = 0; k < alone.size(); ++k) BOOST_TEST_CONTEXT(alone[k].name) {
+        BOOST_TEST(close(placed[k].position, alone[k].position, 1e-10));
+        BOOST_TEST(close(placed[k].rotation, alone[k].rotation, 1e-10));
+        BOOST_TEST(close(placed[k].height, alone[k].height, 1e-10));
+        BOOST_TEST(close(placed[k].velocity, alone[k].velocity, 1e-10));
+      }
   }
 }
 

@@ -111,6 +111,25 @@ BOOST_AUTO_TEST_CASE(the_mean_residual_is_in_the_headings_axes) {
   BOOST_TEST(some.summarize().mean_residual.isZero(0.));
 }
 
+BOOST_AUTO_TEST_CASE(without_a_free_flyer_axes_are_the_worlds) {
+  // This one has as many velocities as a free-flyer, but no quaternion.
+  pinocchio::JointModelComposite root(2);
+  root.addJoint(pinocchio::JointModelTranslation());
+  root.addJoint(pinocchio::JointModelSphericalZYX());
+  pinocchio::Model model;
+  model.appendBodyToJoint(model.addJoint(0, root, SE3::Identity(), "root"),
+                          pinocchio::Inertia::FromSphere(1., 0.1));
+  const DynaCoM robot(model);
+  const Motion motion{VectorXd::LinSpaced(2, 0., 1.), MatrixXd::Ones(6, 2), MatrixXd::Zero(6, 2),
+                      MatrixXd::Zero(6, 2)};
+  MotionAnalysis analysis = analyzeMotion(robot, motion, {{}, ContactSchedule::Matrix(0, 2)});
+  analysis.residual.setOnes();
+  MotionVerdict verdict = {};
+  for (MotionFinding& finding : verdict.findings) finding.measured.setZero(2);
+  BOOST_TEST(
+      close(summarizeMotion(robot, motion, analysis, verdict).mean_residual, Vector6::Ones()));
+}
+
 BOOST_AUTO_TEST_CASE(contacts_have_their_own) {
   Case some;
   MotionAnalysis::Contact& contact = some.analysis.contacts[1];
@@ -174,6 +193,11 @@ BOOST_AUTO_TEST_CASE(measured_forces_are_compared_by_component) {
   BOOST_TEST(difference.correlation[0] == 1., boost::test_tools::tolerance(1e-12));
   BOOST_TEST(std::isnan(difference.correlation[1]));
   BOOST_TEST(difference.correlation[2] == -1., boost::test_tools::tolerance(1e-12));
+
+  // Neither does what is constant but for the rounding of its mean.
+  measured.row(0).setConstant(1. / 3.);
+  computed.row(0).setConstant(1.1);
+  BOOST_TEST(std::isnan(compareMeasured(computed, measured).correlation[0]));
 
   measured.setConstant(kNaN);
   difference = compareMeasured(computed, measured);

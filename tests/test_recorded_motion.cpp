@@ -37,6 +37,9 @@ BOOST_AUTO_TEST_CASE(frame_rates_are_even_or_none) {
   BOOST_TEST(std::isnan(findFrameRate(VectorXd())));
   BOOST_TEST(std::isnan(findFrameRate(VectorXd::Zero(1))));
   BOOST_TEST(findFrameRate(Vector2d(0., 0.5)) == 2.);
+  BOOST_TEST(std::isnan(findFrameRate(Vector2d(0.5, 0.))));
+  BOOST_TEST(std::isnan(findFrameRate(Vector3d(0., kNaN, 1.))));
+  BOOST_TEST(std::isnan(findFrameRate(Vector3d::Ones())));
   // Rounded to milliseconds, at 30 Hz; and a frame that is late by 0.19 of one, and by 0.21.
   VectorXd time = VectorXd::LinSpaced(31, 0., 1.);
   BOOST_TEST(findFrameRate((time * 1000.).array().round() / 1000.) == 30.,
@@ -144,8 +147,14 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_derived_is_refused) {
   refused(nothing, 40., {"cutoff", "< 40 Hz", "0.4", "got 40 Hz"});
   refused([](RecordedMotion& recorded) { recorded.time[50] += 0.004; }, 6.,
           {"times", "evenly spaced", "0.006", "0.014", "without a filter"});
-  refused([](RecordedMotion& recorded) { recorded.time[50] = recorded.time[49]; }, 0.,
-          {"time must increase"});
+  for (const double cutoff : {0., 6.}) {
+    refused([](RecordedMotion& recorded) { recorded.time[50] = recorded.time[49]; }, cutoff,
+            {"time must increase"});
+    refused([](RecordedMotion& recorded) { recorded.time[50] = kNaN; }, cutoff,
+            {"time must be finite", "frame 50"});
+    refused([](RecordedMotion& recorded) { recorded.time.reverseInPlace(); }, cutoff,
+            {"time must increase"});
+  }
   refused([](RecordedMotion& recorded) { recorded.time.resize(0); }, 6., {"at least one frame"});
   refused([](RecordedMotion& recorded) { recorded.q(2, 7) = kNaN; }, 6., {"q", "frame 7"});
   refused([](RecordedMotion& recorded) { recorded.v.setZero(5, 201); }, 6., {"v", "6", "5"});

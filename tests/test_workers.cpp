@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #define BOOST_TEST_MODULE workers
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <boost/test/unit_test.hpp>
 #include <chrono>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <stdexcept>
@@ -183,6 +187,28 @@ BOOST_AUTO_TEST_CASE(progress_increases_in_the_callers_thread) {
                           [](Index) { throw std::runtime_error("enough"); }),
                       std::runtime_error);
   }
+}
+
+BOOST_AUTO_TEST_CASE(a_process_that_was_forked_does_all_by_itself) {
+  auto workers = std::make_unique<Workers>(3);
+  std::atomic<int> done{0};
+  const auto work = [&] {
+    workers->forEach(50, [&]() -> Workers::Work { return [&](Index) { ++done; }; });
+  };
+  work();
+  const pid_t child = fork();
+  if (child == 0) {
+    alarm(20);
+    work();
+    workers.reset();
+    _exit(done == 100 ? 0 : 1);
+  }
+  BOOST_REQUIRE(child > 0);
+  int status = -1;
+  BOOST_REQUIRE(waitpid(child, &status, 0) == child);
+  BOOST_TEST(status == 0);
+  work();
+  BOOST_TEST(done == 100);
 }
 
 BOOST_AUTO_TEST_CASE(blocks_are_the_same_whatever_the_number_of_threads) {

@@ -33,9 +33,13 @@ struct ContactMotion {
   Eigen::Matrix3Xd velocity;  ///< of that corner, as a point of the robot [m/s]
 };
 
+/// How many frames can be computed at once, at most, in the lanes of SIMD registers.
+constexpr int kMaximalLanes = 8;
+
 /// The motions of all contacts that a robot knows, in the order of getKnownContacts(), placed by
 /// the model.
-/// @param threads, lanes  as in AnalysisSettings
+/// @param threads  how many do the work, at most; 0 stands for as many as the machine has
+/// @param lanes    how many frames a thread computes at once, at most
 /// @throws std::invalid_argument if the motion or a number is not valid; NotReadyError before the
 ///         robot's initialize()
 DYNACOM_EXPORT std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot,

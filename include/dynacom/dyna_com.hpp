@@ -245,7 +245,7 @@ class DYNACOM_EXPORT DynaCoM {
                                      const Eigen::Vector3d& com);
   /// Forgets which inequalities were active, and forces that would be kept: the next distribution
   /// starts cold, and does not depend on those before.
-  void forgetDistributions() { distribution_.forgetAnswers(); }
+  void forgetAnswers() { distribution_.forgetAnswers(); }
   /// The last distribution, be it distributeForce()'s or that of computeDynamics() on uneven
   /// ground; its contacts are those that were active then, in the order of their activation. What
   /// was computed or activated since has not changed it.

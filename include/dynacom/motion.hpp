@@ -23,9 +23,6 @@ struct DYNACOM_EXPORT Motion {
   void validate(const pinocchio::Model& model) const;
 };
 
-/// How many frames can be computed at once, at most, in the lanes of SIMD registers.
-constexpr int kMaximalLanes = 8;
-
 /// The largest cut-off frequency that filterConfigurations() takes, as a part of the frame rate:
 /// near a half, the filter's frequencies are squeezed together until little is left of it.
 constexpr double kMaximalCutoff = 0.4;

@@ -17,7 +17,7 @@ namespace dynacom {
 struct DYNACOM_EXPORT ExaminationSettings {
   /// Of the filter where velocities and accelerations have to be computed [Hz]; 0 for none.
   double cutoff = 6.;
-  /// Its threads do all of it. Its own progress is told nothing, but the one below.
+  /// Its threads do all of it. Its progress is not called: the one below is.
   AnalysisSettings analysis = {};
   DetectionSettings detection = {};
   VerdictSettings verdict = {};
@@ -59,10 +59,11 @@ class DYNACOM_EXPORT MotionExaminer {
   /// @throws std::invalid_argument if settings are not valid; NotReadyError before the robot's
   ///         initialize()
   explicit MotionExaminer(const DynaCoM& robot, const ExaminationSettings& settings = {});
-  /// A copy has threads and a robot of its own.
+  /// A copy has threads and a robot of its own. One that was moved from may be assigned to, and no
+  /// more.
   MotionExaminer(const MotionExaminer& other);
   MotionExaminer(MotionExaminer&&) noexcept;
-  MotionExaminer& operator=(MotionExaminer&&) noexcept;
+  MotionExaminer& operator=(MotionExaminer other) noexcept;
   ~MotionExaminer();
 
   const ExaminationSettings& getSettings() const;
@@ -75,13 +76,13 @@ class DYNACOM_EXPORT MotionExaminer {
   ///         and analyzeMotion()
   MotionExamination examine(const RecordedMotion& recorded) const;
 
+  /// Judges many, see analyzeMotions().
+  void examineMany(std::size_t clips, const std::function<RecordedMotion(std::size_t)>& read,
+                   const std::function<void(std::size_t, const MotionExamination*,
+                                            const std::string&)>& done) const;
+
  private:
   struct Office;
-  friend void analyzeMotions(
-      const DynaCoM&, std::size_t, const std::function<RecordedMotion(std::size_t)>&,
-      const std::function<void(std::size_t, const MotionExamination*, const std::string&)>&,
-      const ExaminationSettings&);
-
   std::unique_ptr<Office> office_;
 };
 
@@ -90,9 +91,10 @@ class DYNACOM_EXPORT MotionExaminer {
 DYNACOM_EXPORT MotionExamination examineMotion(const DynaCoM& robot, const RecordedMotion& recorded,
                                                const ExaminationSettings& settings = {});
 
-/// Judges many recorded motions, of one robot. A pool of threads, ExaminationSettings::analysis's,
-/// takes clip after clip; those that find none left take part in what is not done yet. Never are
-/// there more clips in memory than threads, and results do not depend on their number, bit for bit.
+/// Judges many recorded motions of one robot, each as examineMotion() does. A pool of threads,
+/// ExaminationSettings::analysis's, takes clip after clip; those that find none left take part in
+/// what is not done yet. Never are there more clips in memory than threads, and results do not
+/// depend on their number, bit for bit.
 /// @param clips     how many
 /// @param read      gives a clip by its number, 0 to clips − 1, in order; called by several threads
 ///                  at once

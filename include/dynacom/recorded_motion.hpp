@@ -29,8 +29,7 @@ constexpr double kVelocityMismatch = 0.05, kAccelerationMismatch = 0.2;
 /// times are often rounded to milliseconds.
 constexpr double kEvenTimes = 0.1;
 
-/// The frame rate [Hz], where frames are evenly spaced; NaN where they are not, and of one frame.
-/// @param time  frames, strictly increasing [s]
+/// The frame rate [Hz], where times [s] increase and are evenly spaced; else NaN, and of one frame.
 DYNACOM_EXPORT double findFrameRate(const Eigen::VectorXd& time);
 
 /// A motion with derivatives.

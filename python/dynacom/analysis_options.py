@@ -3,7 +3,7 @@
 
 A settings file is YAML; what it does not name stays at its default::
 
-    cutoff: 6.0           # of the filter [Hz]; null for none
+    cutoff: 6.0           # of the filter [Hz]; 0 or null for none
     omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
     flat: true            # the ground is flat and horizontal: see the CoP
     detection:            # DetectionSettings, field by field
@@ -29,7 +29,7 @@ from dynacom.yaml_file import is_number, parse_yaml, read_yaml
 class AnalysisOptions:
     """How a motion is analysed."""
 
-    #: Of the filter where velocities and accelerations are computed [Hz]; None for no filter.
+    #: Of the filter where velocities and accelerations are computed [Hz]; 0 or None for no filter.
     cutoff: float | None = 6.0
     #: Of virtual repellent point and divergent component of motion [rad/s]; 0 stands for
     #: sqrt(g / mean height of the CoM above the ground).
@@ -41,8 +41,8 @@ class AnalysisOptions:
 
     def validate(self) -> None:
         """Raises ValueError, naming the first setting out of its range."""
-        if self.cutoff is not None and not (math.isfinite(self.cutoff) and self.cutoff > 0.0):
-            raise ValueError(f"cutoff must be finite and > 0 Hz, or none, got {self.cutoff:g}")
+        if self.cutoff is not None and not (math.isfinite(self.cutoff) and self.cutoff >= 0.0):
+            raise ValueError(f"cutoff must be finite and >= 0 Hz, or none, got {self.cutoff:g}")
         if not (math.isfinite(self.omega) and self.omega >= 0.0):
             raise ValueError(f"omega must be finite and >= 0 rad/s, got {self.omega:g}")
         self.detection.validate()

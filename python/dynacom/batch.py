@@ -93,6 +93,7 @@ def batch(
         DynacomError: there is no motion at `paths`; `out` has results and `resume` is false, or it
             cannot be written to, or another batch writes to it; an argument is none of those above;
             pyarrow, or Ray, is not installed; the robot, as in :func:`load_robot`.
+        ValueError: options are out of their ranges.
     """
     arguments = {
         "options": options,
@@ -141,7 +142,7 @@ def run_batch(
         What is to be said of all clips together.
 
     Raises:
-        DynacomError: as :func:`batch`.
+        DynacomError, ValueError: as :func:`batch`.
     """
     _need_pyarrow()
     from dynacom.batch_overview import overview
@@ -153,6 +154,8 @@ def run_batch(
     if re.match(r"[a-z][a-z0-9+.-]+:/", str(out), re.IGNORECASE):  # a Path has one slash
         raise DynacomError(f"out must be a folder of this machine, got {out}")
     _check(engine, jobs, shard, quat, report)
+    options = options or AnalysisOptions()
+    options.validate()
     if report:
         check_reports()
     if engine == "ray":
@@ -166,7 +169,7 @@ def run_batch(
         part, parts = shard
         files = dict(list(files.items())[part - 1 :: parts])
     folder = out.absolute() / "frames" if frames else None
-    job = Job(robot, options or AnalysisOptions(), fps, quat, trust, folder)
+    job = Job(robot, options, fps, quat, trust, folder)
     with Store.open(out, job, list(files), resume) as store:
 
         def tasks() -> Iterator[Task]:

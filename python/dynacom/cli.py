@@ -402,8 +402,6 @@ def _make_options(
     options.update_from_texts(texts or [])
     values = {"cutoff": cutoff, "flat": flat, "omega": omega}
     given = {name: value for name, value in values.items() if value is not None}
-    if cutoff == 0.0:
-        given["cutoff"] = None
     if ground_height is not None:
         given["detection"] = {"ground_height": ground_height}
     options.update(given, "options")

@@ -435,6 +435,8 @@ def _derivatives_text(clip: Clip, derived: DerivedMotion) -> str:
 
 
 def _ground_text(robot: Robot, ground: np.ndarray, same_ground: float) -> str:
+    if not len(ground):
+        return "The robot has no contacts."
     heights = ", ".join(
         f"{name} {height:.3f} m" for name, height in zip(robot.contacts, ground, strict=True)
     )

@@ -182,8 +182,7 @@ def test_the_last_counts(options):
         ("cutoff=2020-99-99", ["cutoff must be a finite number", "got '2020-99-99'"]),
         (f"cutoff=1{400 * '0'}", ["cutoff must be a finite number", "got 1000"]),
         ("cutoff.x=1", ["cutoff must be a finite number", "got {'x': 1}"]),
-        ("cutoff=-1", ["settings: cutoff must be finite and > 0 Hz, or none, got -1"]),
-        ("cutoff=0", ["settings: cutoff must be finite and > 0 Hz, or none, got 0"]),
+        ("cutoff=-1", ["settings: cutoff must be finite and >= 0 Hz, or none, got -1"]),
         ("omega=-1", ["settings: omega must be finite and >= 0 rad/s, got -1"]),
         ("omega=null", ["omega must be a finite number", "got None"]),
         ("flat=1", ["flat must be true or false", "got 1"]),
@@ -238,8 +237,8 @@ def test_files_that_cannot_be_read(options, tmp_path):
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("cutoff", -1.0, "cutoff must be finite and > 0 Hz, or none, got -1"),
-        ("cutoff", np.nan, "cutoff must be finite and > 0 Hz, or none, got nan"),
+        ("cutoff", -1.0, "cutoff must be finite and >= 0 Hz, or none, got -1"),
+        ("cutoff", np.nan, "cutoff must be finite and >= 0 Hz, or none, got nan"),
         ("omega", np.inf, "omega must be finite and >= 0 rad/s, got inf"),
         ("detection", None, "DetectionSettings.speed must be finite"),
         ("verdict", None, "VerdictSettings.near_ground must be finite"),

@@ -644,6 +644,8 @@ def test_bad_arguments(walks, tmp_path, monkeypatch):
     refused("got 0/2", walks, ROBOT, shard=(0, 2))
     refused("report must not be negative", walks, ROBOT, report=-1, out=tmp_path / "out")
     refused("out must be a folder of this machine", walks, ROBOT, out="s3://bucket/out")
+    with pytest.raises(ValueError, match="omega must be finite"):
+        dynacom.batch(walks, ROBOT, options=dynacom.AnalysisOptions(omega=-1.0))
     for name in ("resume", "frames", "report"):
         refused(f"{name} needs out", walks, ROBOT, **{name: 1})
     monkeypatch.setitem(sys.modules, "pyarrow", None)

@@ -81,7 +81,7 @@ def test_other_threads_go_on_meanwhile(talos, recorded):
     done = threading.Event()
 
     def work():
-        for _ in range(20):
+        for _ in range(10):
             examiner.examine(recorded)
         done.set()
 
@@ -92,7 +92,8 @@ def test_other_threads_go_on_meanwhile(talos, recorded):
         time.sleep(0.0005)
         ticks += 1
     thread.join()
-    assert ticks > 20
+    # With the lock held, it would be one or two for each call.
+    assert ticks > 40
 
 
 def test_refused(talos, recorded):

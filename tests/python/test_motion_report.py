@@ -150,9 +150,8 @@ def test_arrays_are_those_of_the_steps_by_hand(talos, walk, flat):
             assert_array_equal(report[name], values, name)
     assert report.summary["omega"] == 3.1
     assert report.summary["ground"] == dict(zip(talos.contacts, ground, strict=True))
-    verdict = dynacom.judgeMotion(
-        robot, motion, walk.q, walk.quaternion_error, contacts, ground, analysis
-    )
+    recorded = dynacom.RecordedMotion(walk.time, walk.q, walk.quaternion_error)
+    verdict = dynacom.judgeMotion(robot, motion, recorded, contacts, ground, analysis)
     assert repr(report.verdict.findings) == repr(verdict.findings)
 
 
@@ -842,6 +841,14 @@ def test_progress_that_raises(talos, bare):
 
     with pytest.raises(KeyboardInterrupt):
         analyze(bare, talos, progress=stop)
+
+
+def test_a_robot_without_contacts(talos, bare):
+    """It ought to fall."""
+    report = analyze(bare, replace(talos, contacts={}), sensitivity=False)
+    assert report.summary["codes"] == ["flight_with_support_needed"]
+    assert report.summary["statuses"] == {"NoContact": len(bare.time)}
+    assert "The robot has no contacts." in report.summary["notes"]
 
 
 def test_options_are_not_kept(talos, walk):

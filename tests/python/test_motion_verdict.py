@@ -18,6 +18,7 @@ from dynacom import (
     MotionFinding,
     MotionVerdict,
     NotReadyError,
+    RecordedMotion,
     VerdictSettings,
     analyzeMotion,
     computeContactMotions,
@@ -84,8 +85,7 @@ class Stand:
         return {
             "robot": self.robot,
             "motion": motion,
-            "recorded_q": self.recorded,
-            "quaternion_error": self.quaternion_error,
+            "recorded": RecordedMotion(self.time, self.recorded, self.quaternion_error),
             "contacts": computeContactMotions(self.robot, motion),
             "ground": self.ground,
             "analysis": analyzeMotion(self.robot, motion, ContactSchedule(SOLES, self.active)),
@@ -401,7 +401,7 @@ def test_wrong_types(stand):
     for name, wrong in (
         ("robot", stand.robot.getModel()),
         ("motion", stand.q),
-        ("recorded_q", None),
+        ("recorded", None),
         ("contacts", [1, 2]),
         ("contacts", None),
         ("analysis", None),
@@ -443,7 +443,7 @@ def test_settings_have_defaults(stand):
 
 def test_documentation():
     (text,) = documentation(judgeMotion)
-    assert "recorded_q" in text and "ValueError" in text
+    assert "recorded" in text and "ValueError" in text
     for code in CODES:
         assert code in MotionVerdict.__doc__
         assert getattr(VerdictSettings, code).__doc__
