@@ -36,16 +36,11 @@ BOOST_AUTO_TEST_CASE(joints_of_every_kind_are_known) {
   JointModelComposite composite(2);
   composite.addJoint(JointModelSpherical());
   composite.addJoint(JointModelRUBX());
-  const std::vector<JointModel> kinds = {JointModelRX(),
-                                         JointModelRUBY(),
-                                         JointModelPZ(),
-                                         JointModelFreeFlyer(),
-                                         JointModelSpherical(),
-                                         JointModelSphericalZYX(),
-                                         JointModelPlanar(),
-                                         JointModelTranslation(),
-                                         JointModelHelicalUnaligned(),
-                                         composite,
+  const std::vector<JointModel> kinds = {JointModelRX(),        JointModelRUBY(),
+                                         JointModelPZ(),        JointModelFreeFlyer(),
+                                         JointModelSpherical(), JointModelSphericalZYX(),
+                                         JointModelPlanar(),    JointModelTranslation(),
+                                         JointModelHX(),        composite,
                                          JointModelRUBX()};
   Random random(2);
   // Each between two of one number, which are no neighbours then.
