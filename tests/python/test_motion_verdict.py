@@ -368,9 +368,21 @@ def test_near_ground_out_of_range(stand):
 @pytest.mark.parametrize(
     ("name", "change", "message"),
     [
-        ("recorded_q", lambda q: q[:-1], "recorded.q must have 100 frames, got 99"),
-        ("recorded_q", lambda q: q[:, :-1], r"recorded.q must have 7 components \(nq\), got 6"),
-        ("quaternion_error", lambda e: e[:-1], "quaternion_error must have 100 frames, got 99"),
+        (
+            "recorded",
+            lambda r: RecordedMotion(r.time, r.q[:-1]),
+            "recorded.q must have 100 frames, got 99",
+        ),
+        (
+            "recorded",
+            lambda r: RecordedMotion(r.time, r.q[:, :-1]),
+            r"recorded.q must have 7 components \(nq\), got 6",
+        ),
+        (
+            "recorded",
+            lambda r: RecordedMotion(r.time, r.q, r.quaternion_error[:-1]),
+            "quaternion_error must have 100 frames, got 99",
+        ),
         ("ground", lambda g: g[:1], r"ground must have 2 heights \(one per contact\), got 1"),
         ("contacts", lambda c: c[::-1], "expected 'left', got 'right' and 'left'"),
         ("contacts", lambda c: c[:1], r"ground must have 1 heights \(one per contact\), got 2"),
