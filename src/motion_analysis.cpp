@@ -220,11 +220,12 @@ void Analyst::finish(Eigen::Index frame) {
 
 // Virtual repellent point (7), non-linearity (8) and divergent component of motion (20) of the
 // motion whose centre of pressure is reported, as DynaCoM::computeNL().
-void addPoints(MotionAnalysis& result, bool flat_horizontal_ground) {
+void addPoints(MotionAnalysis& result, bool flat_horizontal_ground, Eigen::Index first,
+               Eigen::Index frames) {
   const Eigen::Matrix3Xd& acceleration =
       flat_horizontal_ground ? result.acom : result.feasible_acom;
   CentroidalState state;
-  for (Eigen::Index frame = 0; frame < result.com.cols(); ++frame) {
+  for (Eigen::Index frame = first; frame < first + frames; ++frame) {
     state.com = result.com.col(frame);
     state.vcom = result.vcom.col(frame);
     state.acom = acceleration.col(frame);
@@ -288,7 +289,12 @@ MotionAnalysis internal::analyzeMotion(Desks& desks, double ground_height, const
   result.omega = settings.omega;
   if (result.omega == 0.)
     result.omega = computeOmega(result.com, -robot.getSettings().gravity.z(), ground_height);
-  if (!std::isnan(result.omega)) addPoints(result, settings.flat_horizontal_ground);
+  if (std::isnan(result.omega)) return result;
+  forEachBlock(workers, motion.frames(), [&]() -> BlockWork {
+    return [&](Eigen::Index first, Eigen::Index frames) {
+      addPoints(result, settings.flat_horizontal_ground, first, frames);
+    };
+  });
   return result;
 }
 
