@@ -106,7 +106,7 @@ class Bench:
         robot.setGroundHeight(float(ground.mean()))
         how = {"flatHorizontalGround": options.flat, "omega": options.omega, "threads": 1}
         analysis = step(distributing, dynacom.analyzeMotion, robot, motion, schedule, **how)
-        found = motion, q, error, contacts, ground, analysis, options.verdict
+        found = motion, recorded, contacts, ground, analysis, options.verdict
         verdict = step(judging, dynacom.judgeMotion, robot, *found, threads=1)
         step(judging, dynacom.summarizeMotion, robot, motion, analysis, verdict)
         return seconds

@@ -53,6 +53,7 @@ struct MotionExamination {
 
 /// Judges recorded motions of one robot. What it needs for that, threads and copies of the robot,
 /// it keeps from one motion to the next: for short clips, these would take as long as the motion.
+/// In a process that was forked from its own it has no threads but the caller's.
 class DYNACOM_EXPORT MotionExaminer {
  public:
   /// @param robot  is copied
@@ -101,7 +102,7 @@ DYNACOM_EXPORT MotionExamination examineMotion(const DynaCoM& robot, const Recor
 /// @param done      takes a clip's number with what was found of it, or null and the message of
 ///                  what was thrown by `read` or MotionExaminer::examine(), which is the end of
 ///                  that clip only. Called by one thread at a time, in the order in which clips are
-///                  done
+///                  done, and no more once it has thrown
 /// @param settings  the progress is not told
 /// @throws what `done` throws, once all threads have stopped; std::invalid_argument if settings are
 ///         not valid; NotReadyError before the robot's initialize()

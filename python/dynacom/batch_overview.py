@@ -59,7 +59,7 @@ def overview(table: Path, listed: int = _LISTED) -> Overview:
 def _judged(table: Path, found: Overview, listed: int) -> Iterator[Row]:
     """The clips that were judged; all are counted on the way."""
     file = pyarrow.parquet.ParquetFile(table)
-    for rows in file.iter_batches(batch_size=2000, columns=list(_COLUMNS)):
+    for rows in file.iter_batches(batch_size=500, columns=list(_COLUMNS)):
         for row in rows.to_pylist():
             if row["status"] == "error":
                 found.errors += 1

@@ -11,8 +11,10 @@ from dynacom.batch_pool import Done, Pool, Task
 from dynacom.batch_row import Job
 from dynacom.errors import DynacomError
 
-# Files that an actor takes at a time.
-_BLOCK = 16
+# Files that an actor takes at a time, at most: what Ray does for a block takes as long as some clips.
+_BLOCK = 64
+# Blocks that each actor gets, at least, so that they end together, and those that die lose little.
+_BLOCKS = 8
 # Of an actor [cores]: there must be room for Ray's own tasks.
 _CORES = 0.5
 
@@ -71,7 +73,8 @@ class RayPool:
         context = self._data.DataContext.get_current()
         bars, context.enable_progress_bars = context.enable_progress_bars, False
         try:
-            blocks = -(-len(items) // _BLOCK)
+            size = min(_BLOCK, max(1, len(items) // (_BLOCKS * self._jobs)))
+            blocks = -(-len(items) // size)
             dataset = self._data.from_items(items, override_num_blocks=blocks).map_batches(
                 _Actor,
                 fn_constructor_args=[self._job],

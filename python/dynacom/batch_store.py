@@ -26,7 +26,7 @@ from dynacom.errors import DynacomError
 _PART_ROWS = 1000
 _PART_SECONDS = 2.0
 # Of the final table: what is read and written at a time.
-_GROUP_ROWS = 4_000
+_GROUP_ROWS = 1_000
 
 
 class Store:
