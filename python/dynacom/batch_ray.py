@@ -11,7 +11,8 @@ from dynacom.batch_pool import Done, Pool, Task
 from dynacom.batch_row import Job
 from dynacom.errors import DynacomError
 
-# Files that an actor takes at a time, at most: what Ray does for a block takes as long as some clips.
+# Files that an actor takes at a time, at most: what Ray does for a block takes as long as some
+# clips.
 _BLOCK = 64
 # Blocks that each actor gets, at least, so that they end together, and those that die lose little.
 _BLOCKS = 8
