@@ -72,16 +72,18 @@ BOOST_AUTO_TEST_CASE(each_item_is_done_once) {
 BOOST_AUTO_TEST_CASE(all_threads_take_part_and_stay) {
   Workers workers(4);
   Threads all;
+  std::atomic<bool> took_part{true};  // Boost's checks are for one thread
   for (int loop = 0; loop < 3; ++loop) {
     Threads threads;
     workers.forEach(4, [&]() -> Workers::Work {
       return [&](Index) {
         threads.add();
         all.add();
-        BOOST_TEST(waitFor([&] { return threads.count() == 4; }));
+        if (!waitFor([&] { return threads.count() == 4; })) took_part = false;
       };
     });
   }
+  BOOST_TEST(took_part);
   BOOST_TEST(all.count() == 4u);
 }
 
@@ -96,7 +98,7 @@ BOOST_AUTO_TEST_CASE(those_without_work_take_part_in_loops_within_loops) {
         workers.forEach(2, [&]() -> Workers::Work {
           return [&](Index) {
             threads.add();
-            BOOST_TEST(waitFor([&] { return threads.count() == 2; }));
+            waitFor([&] { return threads.count() == 2; });
           };
         });
       };
@@ -110,6 +112,7 @@ BOOST_AUTO_TEST_CASE(loops_within_loops_are_done_once) {
     Workers workers(threads);
     const Index outer = 40, inner = 50;
     std::vector<std::atomic<int>> times(static_cast<std::size_t>(outer * inner));
+    std::atomic<bool> ended{true};
     workers.forEach(outer, [&]() -> Workers::Work {
       return [&](Index i) {
         std::atomic<int> own{0};
@@ -119,9 +122,10 @@ BOOST_AUTO_TEST_CASE(loops_within_loops_are_done_once) {
             ++own;
           };
         });
-        BOOST_TEST(own == inner);  // the loop has ended before it goes on
+        if (own != inner) ended = false;
       };
     });
+    BOOST_TEST(ended);  // inner loops have, before it goes on
     for (const std::atomic<int>& time : times) BOOST_TEST(time == 1);
   }
 }
