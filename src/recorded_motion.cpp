@@ -2,6 +2,7 @@
 #include "dynacom/recorded_motion.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "check.hpp"
 #include "motion_check.hpp"
@@ -70,7 +71,13 @@ DerivedMotion rederiveMotion(const pinocchio::Model& model, const RecordedMotion
 
 DerivedMotion deriveMotion(const pinocchio::Model& model, const RecordedMotion& recorded,
                            double cutoff) {
+  internal::requireTime(recorded.time);
   DerivativeMismatch mismatch = {kNaN, kNaN};
+  for (const auto& [name, values] : {std::pair("v", &recorded.v), std::pair("a", &recorded.a)}) {
+    if (values->cols() == 0) continue;
+    internal::requireSize(name, values->rows(), Eigen::Index(model.nv), "components (nv)");
+    internal::requireSize(name, values->cols(), recorded.time.size(), "frames");
+  }
   if (recorded.v.cols() > 0 && recorded.a.cols() > 0) {
     Motion motion{recorded.time, recorded.q, recorded.v, recorded.a};
     mismatch = compareDerivatives(model, motion);

@@ -158,4 +158,5 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_derived_is_refused) {
   refused([](RecordedMotion& recorded) { recorded.time.resize(0); }, 6., {"at least one frame"});
   refused([](RecordedMotion& recorded) { recorded.q(2, 7) = kNaN; }, 6., {"q", "frame 7"});
   refused([](RecordedMotion& recorded) { recorded.v.setZero(5, 201); }, 6., {"v", "6", "5"});
+  refused([](RecordedMotion& recorded) { recorded.a.setZero(6, 3); }, 6., {"a", "201", "3"});
 }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """Many motions at once: a row per clip, whatever the clip."""
 
+import math
 import os
 import re
 import tempfile
@@ -153,7 +154,7 @@ def run_batch(
     out = Path(out)
     if re.match(r"[a-z][a-z0-9+.-]+:/", str(out), re.IGNORECASE):  # a Path has one slash
         raise DynacomError(f"out must be a folder of this machine, got {out}")
-    _check(engine, jobs, shard, quat, report)
+    _check(engine, jobs, shard, fps, quat, report)
     options = options or AnalysisOptions()
     options.validate()
     if report:
@@ -211,7 +212,12 @@ def _need_pyarrow() -> None:
 
 
 def _check(
-    engine: str, jobs: int | None, shard: tuple[int, int] | None, quat: str | None, report: int
+    engine: str,
+    jobs: int | None,
+    shard: tuple[int, int] | None,
+    fps: float | None,
+    quat: str | None,
+    report: int,
 ) -> None:
     if engine not in ("local", "ray"):
         raise DynacomError(f"engine must be local or ray, got '{engine}'")
@@ -219,6 +225,8 @@ def _check(
         raise DynacomError(f"jobs must be at least 1, got {jobs}")
     if report < 0:
         raise DynacomError(f"report must not be negative, got {report}")
+    if fps is not None and not 0.0 < fps < math.inf:
+        raise DynacomError(f"fps must be finite and > 0 Hz, got {fps:g}")
     if quat not in (None, "xyzw", "wxyz"):
         raise DynacomError(f"quat must be xyzw or wxyz, got '{quat}'")
     if shard is not None and not 1 <= shard[0] <= shard[1]:

@@ -28,7 +28,9 @@ td, th { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid var(-
   vertical-align: top; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
 .sortable td:first-child { overflow-wrap: anywhere; min-width: 12rem; }
-.sortable td:not(.n) + td { overflow-wrap: anywhere; min-width: 7rem; }
+.sortable td:nth-child(2):last-child { overflow-wrap: anywhere; }
+.sortable td:nth-child(2):not(:last-child) { white-space: nowrap; }
+.sortable td:nth-child(3) { overflow-wrap: break-word; min-width: 16rem; }
 .bars td:first-child { width: 28rem; } .bars td.n { width: 8rem; white-space: nowrap; }
 .bar { height: .9rem; min-width: 1px; background: var(--bad); border-radius: 2px; }
 .ok { background: var(--ok); } .err { background: var(--err); }
@@ -48,7 +50,7 @@ beside this page.</p>
 <h2>Reasons</h2>
 <p>Clips in which each fault holds; a clip may have several.</p>
 <table class="bars">$reasons</table>
-<h2>Worst clips</h2>
+<h2>Clips, the worst first</h2>
 $worst
 <h2>Errors</h2>
 $errors

@@ -106,7 +106,7 @@ _Payloads = Annotated[
     ),
 ]
 _Fps = Annotated[
-    float | None, typer.Option(metavar="HZ", help="Frame rate, where the file does not say.")
+    float | None, typer.Option(metavar="HZ", help="Frame rate, of files without times.")
 ]
 _Quat = Annotated[
     str | None,

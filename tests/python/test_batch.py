@@ -640,6 +640,7 @@ def test_bad_arguments(walks, tmp_path, monkeypatch):
     refused("engine must be local or ray, got 'x'", walks, ROBOT, engine="x")
     refused("jobs must be at least 1, got 0", walks, ROBOT, jobs=0)
     refused("quat must be xyzw or wxyz", walks, ROBOT, quat="x")
+    refused("fps must be finite and > 0 Hz, got -3", walks, ROBOT, fps=-3.0)
     refused("shard must be i/n with i from 1 to n, got 3/2", walks, ROBOT, shard=(3, 2))
     refused("got 0/2", walks, ROBOT, shard=(0, 2))
     refused("report must not be negative", walks, ROBOT, report=-1, out=tmp_path / "out")
