@@ -6,7 +6,7 @@
 #include "bindings.hpp"
 
 // Reading clips is what most of the time of a batch would go to: numpy.loadtxt takes 170 ns a
-// number, pyarrow 50, in threads of its own, and this 20. It knows nothing but numbers, commas and
+// number, pyarrow 50, in threads of its own, and this 30. It knows nothing but numbers, commas and
 // ends of lines: all else is for a reader that knows more.
 
 namespace dynacom::python {
