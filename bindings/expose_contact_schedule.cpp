@@ -8,7 +8,9 @@ namespace {
 
 using Schedule = ContactSchedule;
 
-std::shared_ptr<Schedule> makeSchedule(const bp::object& names, const Schedule::Matrix& active) {
+std::shared_ptr<Schedule> makeSchedule(const bp::object& names, const Schedule::Matrix& active,
+                                       const bp::object& confidence,
+                                       const bp::object& readiness) {
   auto schedule = std::make_shared<Schedule>();
   if (PyUnicode_Check(names.ptr())) {  // whose letters would be the names
     PyErr_SetString(PyExc_TypeError, "names must be several names, got one text");
@@ -16,10 +18,21 @@ std::shared_ptr<Schedule> makeSchedule(const bp::object& names, const Schedule::
   }
   schedule->names = toVectorOf<std::string>(names);
   schedule->active = active.transpose();
+  for (const auto& [given, matrix] : {std::pair(&confidence, &schedule->confidence),
+                                      std::pair(&readiness, &schedule->readiness)})
+    if (!given->is_none()) *matrix = bp::extract<Eigen::MatrixXd>(*given)().transpose();
   return schedule;
 }
 
 bp::list getNames(const Schedule& schedule) { return toList(schedule.names); }
+
+bp::object toRows(const Eigen::MatrixXd& matrix) {
+  return matrix.size() > 0 ? bp::object(Eigen::MatrixXd(matrix.transpose())) : bp::object();
+}
+
+bp::object getConfidence(const Schedule& schedule) { return toRows(schedule.confidence); }
+
+bp::object getReadiness(const Schedule& schedule) { return toRows(schedule.readiness); }
 
 std::string writeSchedule(const Schedule& schedule) {
   return internal::concat("ContactSchedule(frames=", schedule.active.cols(),
@@ -39,16 +52,6 @@ bp::list listContactMotions(const DynaCoM& robot, const Motion& motion, int thre
   return toList(compute());
 }
 
-Eigen::VectorXd estimate(const bp::object& contacts, const Eigen::VectorXd& time,
-                         const DetectionSettings& settings) {
-  return estimateGround(toVectorOf<ContactMotion>(contacts), time, settings);
-}
-
-Schedule detect(const bp::object& contacts, const Eigen::VectorXd& time,
-                const Eigen::VectorXd& ground, const DetectionSettings& settings) {
-  return detectContacts(toVectorOf<ContactMotion>(contacts), time, ground, settings);
-}
-
 }  // namespace
 
 void exposeContactSchedule() {
@@ -56,12 +59,20 @@ void exposeContactSchedule() {
                                                   "Which contacts are active when.", bp::no_init)
       .def("__init__",
            bp::make_constructor(&makeSchedule, bp::default_call_policies(),
-                                (bp::arg("names"), bp::arg("active"))),
-           "names: C names; active: (T, C) of bool.")
+                                (bp::arg("names"), bp::arg("active"),
+                                 bp::arg("confidence") = bp::object(),
+                                 bp::arg("readiness") = bp::object())),
+           "names: C names; active: (T, C) of bool; confidence, readiness: (T, C), or None where\n"
+           "nobody has said so.")
       .add_property("names", &getNames, "Names of the C contacts")
       .add_property("active", &Rows<&Schedule::active>::get, "(T, C) of bool")
+      .add_property("confidence", &getConfidence,
+                    "Probability that a contact is active, (T, C), or None")
+      .add_property("readiness", &getReadiness,
+                    "How readily a contact bears load while it is active, rho: weights are divided\n"
+                    "by its square root; (T, C), or None for 1")
       .def("validate", &Schedule::validate, (bp::arg("self"), bp::arg("frames")),
-           "Raises ValueError if a name is there twice or active is not (frames, C).")
+           "Raises ValueError if a name is there twice or a matrix is not (frames, C).")
       .def(PrintVisitor<Schedule>(&writeSchedule))
       .def(CopyVisitor<Schedule>());
 
@@ -82,42 +93,11 @@ void exposeContactSchedule() {
       .def(PrintVisitor<ContactMotion>(&writeContactMotion))
       .def(CopyVisitor<ContactMotion>());
 
-  using Settings = DetectionSettings;
-  bp::class_<Settings>("DetectionSettings",
-                       "Where the ground is, and when a contact is held to touch it.")
-      .def_readwrite("height", &Settings::height,
-                     "A contact begins to touch no higher above its ground than this [m]")
-      .def_readwrite("speed", &Settings::speed, "and no faster than this [m/s].")
-      .def_readwrite("release_height", &Settings::release_height,
-                     "It ceases to where it is higher than this [m]")
-      .def_readwrite("release_speed", &Settings::release_speed, "or faster than this [m/s].")
-      .def_readwrite(
-          "rest_speed", &Settings::rest_speed,
-          "At both ends it is cut back to where it is no faster than this, or than three\n"
-          "times its median speed in the contact [m/s].")
-      .def_readwrite("minimal_duration", &Settings::minimal_duration,
-                     "Contacts, and interruptions, shorter than this are none [s].")
-      .def_readwrite("ground_height", &Settings::ground_height,
-                     "The ground's height under all contacts [m]; NaN if it is to be estimated.")
-      .def_readwrite("same_ground", &Settings::same_ground,
-                     "Where a contact's lowest place is higher than another's by more than this,\n"
-                     "it is in the air there, unless it stands still as on a step of a stair [m].")
-      .def(SettingsVisitor<Settings>());
-
   bp::def("computeContactMotions", &listContactMotions,
           (bp::arg("robot"), bp::arg("motion"), bp::arg("threads") = 0,
            bp::arg("lanes") = kMaximalLanes),
           "A ContactMotion for each contact that a robot knows, in its order; threads and lanes\n"
           "as in analyzeMotion. Raises ValueError if the motion is not valid.");
-  bp::def("estimateGround", &estimate,
-          (bp::arg("contacts"), bp::arg("time"), bp::arg("settings") = DetectionSettings()),
-          "The height of the ground under each of C contacts, (C,) [m]: the fifth percentile of\n"
-          "each one's height where it is slow, or the lowest of all where that is in the air.");
-  bp::def("detectContacts", &detect,
-          (bp::arg("contacts"), bp::arg("time"), bp::arg("ground"),
-           bp::arg("settings") = DetectionSettings()),
-          "The ContactSchedule of when contacts touch their ground: with hysteresis in height and\n"
-          "speed, and a minimal duration.");
 }
 
 }  // namespace dynacom::python

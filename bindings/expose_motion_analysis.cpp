@@ -12,6 +12,8 @@ bp::list getStatus(const MotionAnalysis& analysis) { return toList(analysis.stat
 
 bp::list getContacts(const MotionAnalysis& analysis) { return toList(analysis.contacts); }
 
+bp::list getParts(const MotionAnalysis& analysis) { return toList(analysis.parts); }
+
 std::string writeAnalysis(const MotionAnalysis& analysis) {
   std::map<DistributionStatus, int> counts;
   for (const DistributionStatus status : analysis.status) ++counts[status];
@@ -104,6 +106,8 @@ void exposeMotionAnalysis() {
           .add_property("residual", &Rows<&Analysis::residual>::get,
                         "Ground wrench minus what the contacts give, (T, 6)")
           .add_property("contacts", &getContacts, "A MotionAnalysis.Contact for each contact")
+          .add_property("parts", &getParts,
+                        "The same for the contacts' parts, where these were gathered")
           .def(PrintVisitor<Analysis>(&writeAnalysis))
           .def(CopyVisitor<Analysis>());
   bp::class_<Contact>("Contact", "What one contact does.", bp::no_init)
@@ -116,6 +120,8 @@ void exposeMotionAnalysis() {
                     "Centre of pressure in the surface's plane, (T, 2) [m]; NaN without load")
       .add_property("friction_usage", getter(&Contact::friction_usage),
                     "(T,), 1 on the friction pyramid; NaN where not active")
+      .add_property("cone_usage", getter(&Contact::cone_usage),
+                    "(T,), 1 on the friction cone; NaN where not active")
       .add_property("yaw_usage", getter(&Contact::yaw_usage), "Likewise, of the yaw moment")
       .add_property("cop_margin", getter(&Contact::cop_margin),
                     "Distance of cop to the nearest edge, (T,) [m]; NaN without load or edges")

@@ -10,6 +10,16 @@ using Examination = MotionExamination;
 
 bp::list getContacts(const Examination& examination) { return toList(examination.contacts); }
 
+bp::list getParts(const Examination& examination) { return toList(examination.parts); }
+
+bp::list getPartMotions(const Examination& examination) {
+  return toList(examination.part_motions);
+}
+
+bp::object getInferred(const Examination& examination) {
+  return examination.inferred ? bp::object(*examination.inferred) : bp::object();
+}
+
 bp::list getSensitivity(const Examination& examination) { return toList(examination.sensitivity); }
 
 std::string writeExamination(const Examination& examination) {
@@ -61,9 +71,16 @@ void exposeMotionExamination() {
                           bp::no_init)
       .def_readonly("derived", &Examination::derived, "The DerivedMotion")
       .add_property("contacts", &getContacts, "A ContactMotion for each contact")
-      .add_property("ground", getter(&Examination::ground),
-                    "Height of the ground under each contact, (C,) [m]")
-      .def_readonly("schedule", &Examination::schedule, "The ContactSchedule")
+      .add_property("parts", &getParts, "A PartRobot.Part for each part of the contacts")
+      .add_property("part_motions", &getPartMotions,
+                    "A ContactMotion for each of them, with velocities relative to the ground")
+      .def_readonly("inference", &Examination::inference, "The ContactInference, of the parts")
+      .add_property("ground", &Rows<&Examination::ground>::get,
+                    "Height of the ground under each contact's lowest part, (T, C) [m]; NaN where\n"
+                    "there is none")
+      .def_readonly("schedule", &Examination::schedule, "The ContactSchedule of the contacts")
+      .add_property("inferred", &getInferred,
+                    "What inference finds on its own, where contacts were recorded; else None")
       .def_readonly("analysis", &Examination::analysis, "The MotionAnalysis")
       .def_readonly("verdict", &Examination::verdict, "The MotionVerdict")
       .def_readonly("statistics", &Examination::statistics, "The MotionStatistics")
@@ -76,10 +93,10 @@ void exposeMotionExamination() {
   bp::class_<MotionExaminer, std::shared_ptr<MotionExaminer>>(
       "MotionExaminer",
       "Judges recorded motions of one robot, a DynaCoM, which is copied: deriveMotion,\n"
-      "computeContactMotions, estimateGround, detectContacts unless a schedule was recorded,\n"
-      "analyzeMotion, judgeMotion and summarizeMotion, one after the other. The ground that the\n"
-      "centre of pressure lies on is the mean of those below the contacts. Threads and copies of\n"
-      "the robot are kept from one motion to the next.",
+      "computeContactMotions, inferContacts for the contacts' parts, analyzeMotion, gatherParts,\n"
+      "judgeMotion and summarizeMotion, one after the other. The ground that the centre of\n"
+      "pressure lies on is the mean of those that are stood on. Threads and copies of the robot\n"
+      "are kept from one motion to the next.",
       bp::no_init)
       .def("__init__",
            bp::make_constructor(

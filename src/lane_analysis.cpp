@@ -218,7 +218,7 @@ LaneAnalysis::LaneAnalysis(const LaneRobot& robot, double ground_height,
 }
 
 void LaneAnalysis::run(const Motion& motion, Eigen::Index first, Eigen::Index frames,
-                       MotionAnalysis& result) {
+                       const Eigen::MatrixXd& readiness, MotionAnalysis& result) {
   const auto size = static_cast<std::size_t>(frames);
   outcomes_.resize(size);
   placements_.resize(12 * rows_.size() * size);
@@ -226,10 +226,12 @@ void LaneAnalysis::run(const Motion& motion, Eigen::Index first, Eigen::Index fr
   const auto number = [first](auto& values) { return values.data() + first; };
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     MotionAnalysis::Contact& contact = result.contacts[k];
-    rows_[k] = {number(contact.active),         from(contact.wrench),
-                number(contact.vertical_force), from(contact.cop),
-                number(contact.friction_usage), number(contact.yaw_usage),
-                number(contact.cop_margin)};
+    const double* own_readiness =
+        readiness.size() > 0 ? readiness.col(static_cast<Eigen::Index>(k)).data() + first : nullptr;
+    rows_[k] = {number(contact.active),       own_readiness,
+                from(contact.wrench),         number(contact.vertical_force),
+                from(contact.cop),            number(contact.friction_usage),
+                number(contact.yaw_usage),    number(contact.cop_margin)};
   }
   lanes::Frames described = {};
   described.count = frames;

@@ -42,7 +42,9 @@ class LaneAnalysis {
 
   /// Analyzes some frames of a motion, as far as lanes do.
   /// @param result  with storage for all frames, and the contacts' active in place
-  void run(const Motion& motion, Eigen::Index first, Eigen::Index frames, MotionAnalysis& result);
+  /// @param readiness  of the contacts, frames × contacts, or nothing; see ContactSchedule
+  void run(const Motion& motion, Eigen::Index first, Eigen::Index frames,
+           const Eigen::MatrixXd& readiness, MotionAnalysis& result);
 
   /// Finds how the contacts' frames lie and move in some frames of a motion.
   void place(const Motion& motion, Eigen::Index first, Eigen::Index frames);

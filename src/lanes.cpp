@@ -148,7 +148,7 @@ class Analysis {
  private:
   // A contact as it stands in the frames at hand.
   struct Standing {
-    Lanes is_active;  // 1 or 0
+    Lanes is_active;  // its readiness, or 0
     bool takes_part;  // in any frame
     Matrix rotation;  // of its surface
     Vector lever;     // from the CoM to the surface's origin
@@ -438,8 +438,12 @@ void Analysis::place(const Frames& frames) {
     const Contact& contact = contacts_[k];
     Standing& standing = standing_[k];
     const bool* active = frames.contacts[k].active + first_;
-    standing.is_active =
-        Lanes([&](auto lane) { return active[std::min<int>(lane, count_ - 1)] ? 1. : 0.; });
+    const double* readiness = frames.contacts[k].readiness;
+    standing.is_active = Lanes([&](auto lane) {
+      const int frame = std::min<int>(lane, count_ - 1);
+      if (!active[frame]) return 0.;
+      return readiness ? readiness[first_ + frame] : 1.;
+    });
     standing.takes_part = stdx::any_of(standing.is_active > 0.);
     if (!standing.takes_part) continue;
     const Moving& parent = moving_[static_cast<std::size_t>(contact.parent)];

@@ -66,6 +66,7 @@ enum class Outcome : unsigned char {
 /// outcome is Everything.
 struct ContactRows {
   const bool* active;
+  const double* readiness;  // see ContactSchedule; null for 1
   double *wrench, *vertical_force, *cop, *friction_usage, *yaw_usage, *cop_margin;
 };
 
@@ -103,7 +104,7 @@ struct Interface {
   void (*destroy)(void* analysis);
 };
 
-constexpr int kVersion = 2;  // grows with each change to this file
+constexpr int kVersion = 3;  // grows with each change to this file
 constexpr char kEntry[] = "dynacom_lanes";
 using Entry = const Interface* (*)();
 

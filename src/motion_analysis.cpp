@@ -5,7 +5,9 @@
 #include <optional>
 
 #include "check.hpp"
+#include "cone_usage.hpp"
 #include "contact_frame.hpp"
+#include "dynacom/contact_point.hpp"
 #include "lane_analysis.hpp"
 #include "motion_check.hpp"
 #include "motion_steps.hpp"
@@ -57,22 +59,39 @@ MotionAnalysis makeStorage(const std::vector<std::string>& names, const Motion& 
     contact.wrench.resize(6, frames);
     contact.cop.resize(2, frames);
     for (Eigen::VectorXd* values : {&contact.vertical_force, &contact.friction_usage,
-                                    &contact.yaw_usage, &contact.cop_margin})
+                                    &contact.yaw_usage, &contact.cop_margin, &contact.cone_usage})
       values->resize(frames);
     result.contacts.push_back(std::move(contact));
   }
   return result;
 }
 
+// How readily the robot's contacts bear load, frames × contacts; nothing where the schedule says
+// nothing.
+Eigen::MatrixXd orderReadiness(const std::vector<std::string>& names, Eigen::Index frames,
+                               const ContactSchedule& schedule) {
+  if (schedule.readiness.size() == 0) return {};
+  Eigen::MatrixXd readiness =
+      Eigen::MatrixXd::Ones(frames, static_cast<Eigen::Index>(names.size()));
+  for (std::size_t row = 0; row < schedule.names.size(); ++row)
+    for (std::size_t k = 0; k < names.size(); ++k)
+      if (names[k] == schedule.names[row])
+        readiness.col(static_cast<Eigen::Index>(k)) =
+            schedule.readiness.row(static_cast<Eigen::Index>(row)).transpose();
+  return readiness;
+}
+
 // What a thread does with blocks of frames.
 class Analyst {
  public:
   Analyst(Desks& desks, double ground_height, const Motion& motion, const ContactSchedule& schedule,
-          const AnalysisSettings& settings, MotionAnalysis& result)
+          const Eigen::MatrixXd& readiness, const AnalysisSettings& settings,
+          MotionAnalysis& result)
       : desks_(desks),
         ground_height_(ground_height),
         motion_(motion),
         schedule_(schedule),
+        readiness_(readiness),
         flat_(settings.flat_horizontal_ground),
         check_(desks.robot().getModel()),
         result_(result) {
@@ -82,7 +101,7 @@ class Analyst {
   void analyze(Eigen::Index first, Eigen::Index frames) {
     writeDefaults(first, frames);
     is_cold_ = true;
-    if (lanes_) lanes_->run(motion_, first, frames, result_);
+    if (lanes_) lanes_->run(motion_, first, frames, readiness_, result_);
     for (Eigen::Index k = 0; k < frames; ++k) {
       const Eigen::Index frame = first + k;
       const auto outcome = lanes_ ? lanes_->outcome(k) : lanes::Outcome::Nothing;
@@ -103,6 +122,7 @@ class Analyst {
  private:
   void writeDefaults(Eigen::Index first, Eigen::Index frames);
   DynaCoM& prepare(Eigen::Index frame);
+  void setWeights(Eigen::Index frame);
   void takeDynamics(Eigen::Index k, Eigen::Index frame);
   void computeDynamics(Eigen::Index frame);
   void finish(Eigen::Index frame);
@@ -111,13 +131,15 @@ class Analyst {
   const double ground_height_;
   const Motion& motion_;
   const ContactSchedule& schedule_;
+  const Eigen::MatrixXd& readiness_;  // frames × contacts, or nothing
   const bool flat_;
   const MotionCheck check_;
   MotionAnalysis& result_;
   std::optional<LaneAnalysis> lanes_;
   // For what the lanes leave, as soon as there is any: a robot, and its contacts.
   std::shared_ptr<DynaCoM> worker_;
-  std::vector<std::shared_ptr<const ContactBase>> contacts_;
+  std::vector<std::shared_ptr<ContactBase>> contacts_;
+  std::vector<Eigen::VectorXd> weights_;  // of the contacts' forces, where these may change
   bool is_cold_ = true;  // whether the worker has done nothing in this block
 };
 
@@ -140,8 +162,10 @@ DynaCoM& Analyst::prepare(Eigen::Index frame) {
   if (!worker_) {
     worker_ = desks_.take();
     worker_->setGroundHeight(ground_height_);
-    for (const MotionAnalysis::Contact& contact : result_.contacts)
+    for (const MotionAnalysis::Contact& contact : result_.contacts) {
       contacts_.push_back(worker_->getContact(contact.name));
+      weights_.push_back(contacts_.back()->reg_A());
+    }
   }
   if (is_cold_) {
     Desks::clear(*worker_);
@@ -153,7 +177,24 @@ DynaCoM& Analyst::prepare(Eigen::Index frame) {
     else
       worker_->deactivateContact(schedule_.names[k]);
   }
+  if (readiness_.size() > 0) setWeights(frame);
   return *worker_;
+}
+
+// Weights of the forces of active contacts, by how readily they bear load.
+void Analyst::setWeights(Eigen::Index frame) {
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    if (!result_.contacts[k].active[frame]) continue;
+    const double factor = 1. / std::sqrt(readiness_(frame, static_cast<Eigen::Index>(k)));
+    if (contacts_[k]->reg_A()[0] == factor * weights_[k][0]) continue;
+    const Eigen::Vector3d force_weights = factor * weights_[k].head<3>();
+    if (auto* point = dynamic_cast<ContactPoint*>(contacts_[k].get())) {
+      point->setForceWeights(force_weights);
+    } else if (auto* surface = dynamic_cast<Contact6D*>(contacts_[k].get())) {
+      surface->setForceWeights(force_weights);
+      surface->setTorqueWeights(factor * weights_[k].tail<3>());
+    }
+  }
 }
 
 // From the dynamics that lanes have computed.
@@ -274,9 +315,11 @@ MotionAnalysis internal::analyzeMotion(Desks& desks, double ground_height, const
   for (const std::string& name : schedule.names) robot.getContact(name);
   const std::vector<std::string> names = robot.getKnownContacts();
   MotionAnalysis result = makeStorage(names, motion, schedule);
+  const Eigen::MatrixXd readiness = orderReadiness(names, motion.frames(), schedule);
   const auto makeWork = [&]() -> BlockWork {
     const auto analyst =
-        std::make_shared<Analyst>(desks, ground_height, motion, schedule, settings, result);
+        std::make_shared<Analyst>(desks, ground_height, motion, schedule, readiness, settings,
+                                  result);
     return [analyst](Eigen::Index first, Eigen::Index frames) { analyst->analyze(first, frames); };
   };
   try {
@@ -284,6 +327,14 @@ MotionAnalysis internal::analyzeMotion(Desks& desks, double ground_height, const
   } catch (const InvalidFrame&) {
     motion.validate(robot.getModel());
     throw;
+  }
+  for (MotionAnalysis::Contact& contact : result.contacts) {
+    const double mu = internal::findFriction(*robot.getContact(contact.name));
+    for (Eigen::Index frame = 0; frame < motion.frames(); ++frame)
+      contact.cone_usage[frame] =
+          contact.active[frame] ? internal::findConeUsage(contact.wrench.col(frame).head<3>(), mu,
+                                                          robot.getMinimalVerticalForce())
+                                : kNaN;
   }
 
   result.omega = settings.omega;

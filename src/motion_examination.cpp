@@ -8,6 +8,7 @@
 
 #include "check.hpp"
 #include "motion_steps.hpp"
+#include "nan.hpp"
 
 namespace dynacom {
 
@@ -19,20 +20,84 @@ void ExaminationSettings::validate() const {
   verdict.validate();
 }
 
+namespace {
+
+// Velocities as the ground sees them, which may be a treadmill.
+void makeRelative(const Eigen::Vector3d& ground_velocity, std::vector<ContactMotion>& motions) {
+  if (ground_velocity.isZero(0.)) return;
+  for (ContactMotion& moved : motions) moved.velocity.colwise() -= ground_velocity;
+}
+
+// The ground under each contact's lowest part.
+Eigen::MatrixXd findGround(const std::vector<ContactMotion>& contacts,
+                           const std::vector<PartRobot::Part>& parts,
+                           const std::vector<ContactMotion>& motions,
+                           const Eigen::MatrixXd& part_ground) {
+  const auto count = static_cast<Eigen::Index>(contacts.size());
+  const Eigen::Index frames = part_ground.cols();
+  Eigen::MatrixXd ground = Eigen::MatrixXd::Constant(count, frames, internal::kNaN);
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const auto owner = static_cast<Eigen::Index>(parts[k].contact);
+    for (Eigen::Index frame = 0; frame < frames; ++frame) {
+      const double height =
+          motions[k].height[frame] - part_ground(static_cast<Eigen::Index>(k), frame);
+      const double whole = contacts[parts[k].contact].height[frame] - height;
+      double& value = ground(owner, frame);
+      if (!std::isnan(whole) && !(value >= whole)) value = whole;
+    }
+  }
+  return ground;
+}
+
+// The mean height of what is stood on; the robot's ground where nothing is.
+double findMeanGround(const ContactInference& found, double otherwise) {
+  double sum = 0.;
+  Eigen::Index count = 0;
+  for (Eigen::Index frame = 0; frame < found.ground.cols(); ++frame)
+    for (Eigen::Index part = 0; part < found.ground.rows(); ++part)
+      if (found.schedule.active(part, frame)) {
+        sum += found.ground(part, frame);
+        ++count;
+      }
+  return count > 0 ? sum / double(count) : otherwise;
+}
+
+// Frames whose accelerations a filter has smeared: those around the beginning and the end of a
+// flight, where the force jumps, by half a period of the cut-off.
+void addSmeared(const ContactSchedule& schedule, const Eigen::VectorXd& time, double cutoff,
+                Eigen::Array<bool, Eigen::Dynamic, 1>& unsure) {
+  if (!(cutoff > 0.)) return;
+  const double width = 0.5 / cutoff;
+  const Eigen::Index frames = time.size();
+  if (unsure.size() == 0) unsure.setConstant(frames, false);
+  for (Eigen::Index frame = 1; frame < frames; ++frame) {
+    if (schedule.active.col(frame).any() == schedule.active.col(frame - 1).any()) continue;
+    for (Eigen::Index k = frame; k < frames && time[k] - time[frame] <= width; ++k)
+      unsure[k] = true;
+    for (Eigen::Index k = frame - 1; k >= 0 && time[frame - 1] - time[k] <= width; --k)
+      unsure[k] = true;
+  }
+}
+
+}  // namespace
+
 /// What is kept from one motion to the next.
 struct MotionExaminer::Office {
   Office(const DynaCoM& given, const ExaminationSettings& given_settings)
       : robot(given),
+        parts(splitContacts(robot)),
         settings(given_settings),
         desks(robot, given_settings.analysis.lanes),
+        part_desks(parts.robot, given_settings.analysis.lanes),
         workers(given_settings.analysis.threads) {}
 
   MotionExamination examine(const RecordedMotion& recorded,
                             const std::function<void(double)>& progress);
 
   const DynaCoM robot;
+  const PartRobot parts;
   const ExaminationSettings settings;
-  internal::Desks desks;
+  internal::Desks desks, part_desks;
   internal::Workers workers;
 };
 
@@ -41,49 +106,79 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   MotionExamination found = {};
   found.derived = deriveMotion(robot.getModel(), recorded, settings.cutoff);
   const Motion& motion = found.derived.motion;
+  found.parts = parts.parts;
   found.contacts = internal::computeContactMotions(desks, motion, workers);
-  found.ground = estimateGround(found.contacts, motion.time, settings.detection);
-  found.schedule = recorded.schedule.has_value() ? *recorded.schedule
-                                                 : detectContacts(found.contacts, motion.time,
-                                                                  found.ground, settings.detection);
-  const double ground_height =
-      found.ground.size() > 0 ? found.ground.mean() : robot.getGroundHeight();
+  found.part_motions = internal::computeContactMotions(part_desks, motion, workers);
 
   std::vector<double> cutoffs;
   if (settings.sensitivity && found.derived.cutoff > 0.)
     for (const double cutoff : {0.5 * found.derived.cutoff, 2. * found.derived.cutoff})
       if (cutoff < kMaximalCutoff * found.derived.frame_rate) cutoffs.push_back(cutoff);
-
   Eigen::Index done = 0;
-  const auto work = double(motion.frames()) * double(1 + cutoffs.size());
+  const auto work = double(motion.frames()) * double(2 + cutoffs.size());
   AnalysisSettings analysis_settings = settings.analysis;
   analysis_settings.progress = nullptr;
   if (progress)
     analysis_settings.progress = [&](Eigen::Index frames) {
       progress(double(done + frames) / work);
     };
-  const auto analyze = [&](const Motion& moved) {
-    MotionAnalysis analysis = internal::analyzeMotion(desks, ground_height, moved, found.schedule,
+  const auto analyze = [&](const Motion& moved, const ContactSchedule& schedule,
+                           double ground_height) {
+    MotionAnalysis analysis = internal::analyzeMotion(part_desks, ground_height, moved, schedule,
                                                       analysis_settings, workers);
     done += motion.frames();
     return analysis;
   };
-  const auto judge = [&](const Motion& moved, const std::vector<ContactMotion>& contacts,
+
+  {
+    const MotionAnalysis dynamics = analyze(motion, {}, robot.getGroundHeight());
+    const bool exact = found.derived.cutoff == 0.;
+    const auto infer = [&](const ContactSchedule* schedule) {
+      return inferContacts(parts, found.part_motions, dynamics, exact, settings.detection,
+                           schedule);
+    };
+    if (recorded.schedule.has_value()) {
+      for (const std::string& name : recorded.schedule->names) robot.getContact(name);
+      found.inference = infer(&*recorded.schedule);
+      found.inferred = gatherParts(robot, parts, infer(nullptr).schedule);
+    } else {
+      found.inference = infer(nullptr);
+    }
+  }
+  const ContactSchedule& schedule = found.inference.schedule;
+  found.schedule = gatherParts(robot, parts, schedule);
+  makeRelative(found.inference.ground_velocity, found.part_motions);
+  found.ground =
+      findGround(found.contacts, parts.parts, found.part_motions, found.inference.ground);
+  const double ground_height = findMeanGround(found.inference, robot.getGroundHeight());
+
+  const auto judge = [&](const DerivedMotion& derived, const std::vector<ContactMotion>& motions,
                          const MotionAnalysis& analysis) {
-    return internal::judgeMotion(desks, moved, recorded, contacts, found.ground, analysis,
-                                 settings.verdict, workers);
+    Eigen::Array<bool, Eigen::Dynamic, 1> unsure = derived.unsure;
+    addSmeared(schedule, derived.motion.time, derived.cutoff, unsure);
+    return internal::judgeMotion(part_desks, derived.motion, recorded, motions,
+                                 found.inference.ground, analysis, settings.verdict, workers,
+                                 unsure);
   };
-  found.analysis = analyze(motion);
-  found.verdict = judge(motion, found.contacts, found.analysis);
+  const MotionAnalysis analysis = analyze(motion, schedule, ground_height);
+  found.verdict = judge(found.derived, found.part_motions, analysis);
+  found.analysis = gatherParts(robot, parts, found.contacts, found.part_motions, analysis);
   found.statistics = summarizeMotion(robot, motion, found.analysis, found.verdict);
   for (const double cutoff : cutoffs) {
-    const Motion other = rederiveMotion(robot.getModel(), recorded, cutoff).motion;
-    const MotionAnalysis analysis = analyze(other);
+    const DerivedMotion other = rederiveMotion(robot.getModel(), recorded, cutoff);
+    const MotionAnalysis other_analysis = analyze(other.motion, schedule, ground_height);
+    std::vector<ContactMotion> motions =
+        internal::computeContactMotions(part_desks, other.motion, workers);
+    makeRelative(found.inference.ground_velocity, motions);
     CutoffSensitivity sensitivity = {};
     sensitivity.cutoff = cutoff;
-    sensitivity.verdict =
-        judge(other, internal::computeContactMotions(desks, other, workers), analysis);
-    sensitivity.statistics = summarizeMotion(robot, other, analysis, sensitivity.verdict);
+    sensitivity.verdict = judge(other, motions, other_analysis);
+    sensitivity.statistics =
+        summarizeMotion(robot, other.motion,
+                        gatherParts(robot, parts,
+                                    internal::computeContactMotions(desks, other.motion, workers),
+                                    motions, other_analysis),
+                        sensitivity.verdict);
     found.sensitivity.push_back(std::move(sensitivity));
   }
   return found;

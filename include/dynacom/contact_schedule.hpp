@@ -2,8 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <iosfwd>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -18,8 +16,14 @@ struct DYNACOM_EXPORT ContactSchedule {
 
   std::vector<std::string> names;  ///< of contacts
   Matrix active;                   ///< names.size() × frames
+  /// How probable it is that a contact is active, from 0 to 1: names.size() × frames, or nothing
+  /// where nobody has said so.
+  Eigen::MatrixXd confidence = {};
+  /// How readily a contact bears load while it is active, 0 < ρ ≤ 1: the weights of its force are
+  /// divided by √ρ. names.size() × frames, or nothing for 1.
+  Eigen::MatrixXd readiness = {};
 
-  /// @throws std::invalid_argument if a name is there twice, or active has another size
+  /// @throws std::invalid_argument if a name is there twice, or a matrix has another size
   void validate(Eigen::Index frames) const;
 };
 
@@ -46,54 +50,5 @@ DYNACOM_EXPORT std::vector<ContactMotion> computeContactMotions(const DynaCoM& r
                                                                 const Motion& motion,
                                                                 int threads = 0,
                                                                 int lanes = kMaximalLanes);
-
-/// Where the ground is, and when a contact is held to touch it.
-struct DYNACOM_EXPORT DetectionSettings {
-  /// A contact begins to touch where its lowest corner is no higher above its ground than this [m],
-  /// and no faster than that [m/s]; both ≥ 0.
-  double height = 0.015, speed = 0.25;
-  /// It ceases to where that corner is higher or faster than this; at least as much as the above.
-  double release_height = 0.03, release_speed = 0.5;
-  /// At its beginning and end, a contact is cut back to where that corner is no faster than this,
-  /// or than three times its median speed in the contact if that is more: a foot that lands or
-  /// leaves is not at rest yet, or any more, although it is low and slow, ≥ 0 [m/s].
-  double rest_speed = 0.1;
-  /// Contacts, and interruptions, shorter than this are none, ≥ 0 [s].
-  double minimal_duration = 0.1;
-  /// The ground's height under all contacts [m]; NaN if it is to be estimated.
-  double ground_height = std::numeric_limits<double>::quiet_NaN();
-  /// Where a contact's lowest place is higher than another's by more than this, it is in the air
-  /// there, unless it stands still as on a step of a stair, ≥ 0 [m].
-  double same_ground = 0.05;
-
-  /// @throws std::invalid_argument naming the first field out of its range
-  void validate() const;
-  std::string to_string() const;
-  bool operator==(const DetectionSettings& other) const;
-  bool operator!=(const DetectionSettings& other) const { return !(*this == other); }
-};
-
-DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const DetectionSettings& settings);
-
-/// The height of the ground under each contact [m], from where the contacts are when they are slow:
-/// the fifth percentile of each one's height there. A contact that is never slow, or whose
-/// percentile is above the lowest by more than DetectionSettings::same_ground without the contact
-/// standing still there, has the lowest ground of all.
-/// @param contacts  of computeContactMotions()
-/// @param time      frames, strictly increasing [s]
-/// @throws std::invalid_argument if settings are not valid, or sizes differ
-DYNACOM_EXPORT Eigen::VectorXd estimateGround(const std::vector<ContactMotion>& contacts,
-                                              const Eigen::VectorXd& time,
-                                              const DetectionSettings& settings = {});
-
-/// Finds when contacts touch their ground.
-/// @param contacts  of computeContactMotions()
-/// @param time      frames, strictly increasing [s]
-/// @param ground    height of the ground under each contact [m]
-/// @throws std::invalid_argument if settings are not valid, or sizes differ
-DYNACOM_EXPORT ContactSchedule detectContacts(const std::vector<ContactMotion>& contacts,
-                                              const Eigen::VectorXd& time,
-                                              const Eigen::VectorXd& ground,
-                                              const DetectionSettings& settings = {});
 
 }  // namespace dynacom

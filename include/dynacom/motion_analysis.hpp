@@ -53,6 +53,9 @@ struct MotionAnalysis {
     /// getContactCoPMargin() [m]; NaN where not active.
     Eigen::Matrix2Xd cop;
     Eigen::VectorXd friction_usage, yaw_usage, cop_margin;
+    /// ‖(f_x, f_y)‖ / (μ f_z): 1 on the friction cone, which the pyramid of friction_usage goes
+    /// around. Zero below the minimal vertical force, NaN without friction or where not active.
+    Eigen::VectorXd cone_usage;
   };
 
   double omega;  ///< The ω in use; NaN where there is none, and then vrp, nl and dcm are NaN.
@@ -67,6 +70,8 @@ struct MotionAnalysis {
   /// Ground wrench minus what the contacts give, about c.
   Eigen::Matrix<double, 6, Eigen::Dynamic> residual;
   std::vector<Contact> contacts;  ///< all, as getKnownContacts() of the robot
+  /// Of gatherParts(): the same for the parts of these contacts.
+  std::vector<Contact> parts;
 };
 
 /// Computes dynamics and distribution for every frame of a motion, whose contacts are placed by the

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "dynacom/contact_inference.hpp"
 #include "dynacom/motion_statistics.hpp"
 #include "dynacom/recorded_motion.hpp"
 
@@ -43,9 +44,17 @@ struct CutoffSensitivity {
 struct MotionExamination {
   DerivedMotion derived;
   std::vector<ContactMotion> contacts;  ///< computeContactMotions()
-  Eigen::VectorXd ground;               ///< estimateGround() [m]
-  ContactSchedule schedule;             ///< as recorded, else detectContacts()
-  MotionAnalysis analysis;
+  std::vector<PartRobot::Part> parts;   ///< splitContacts()
+  /// The same as `contacts` for the parts, but that velocities are relative to the ground.
+  std::vector<ContactMotion> part_motions;
+  /// inferContacts(): of the parts, within the contacts that are recorded, if there are any.
+  ContactInference inference;
+  ContactSchedule schedule;  ///< of the contacts, gathered from that of their parts
+  /// What inferContacts() finds on its own, gathered, where contacts are recorded.
+  std::optional<ContactSchedule> inferred;
+  Eigen::MatrixXd ground;   ///< height of the ground under each contact's lowest part, contacts ×
+                            ///< frames [m]; NaN where there is none
+  MotionAnalysis analysis;  ///< gatherParts()
   MotionVerdict verdict;
   MotionStatistics statistics;
   std::vector<CutoffSensitivity> sensitivity;  ///< with half, and with twice the cut-off
@@ -70,9 +79,9 @@ class DYNACOM_EXPORT MotionExaminer {
   const ExaminationSettings& getSettings() const;
 
   /// Finds a motion's derivatives, what its contacts do and where the ground is, and what that asks
-  /// of them. The ground that the centre of pressure lies on is the mean of those below the
-  /// contacts. Results do not depend on what was examined before; several threads may call this at
-  /// once.
+  /// of them. Contacts are taken apart: what bears load is which of their parts touch. The ground
+  /// that the centre of pressure lies on is the mean of those that the parts stand on. Results do
+  /// not depend on what was examined before; several threads may call this at once.
   /// @throws std::invalid_argument if the motion or its schedule is not valid, see deriveMotion()
   ///         and analyzeMotion()
   MotionExamination examine(const RecordedMotion& recorded) const;

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "bindings.hpp"
+#include "dynacom/contact_inference.hpp"
+
+namespace dynacom::python {
+
+namespace {
+
+bp::list getParts(const PartRobot& split) { return toList(split.parts); }
+
+std::string writePart(const PartRobot::Part& part) {
+  return internal::concat("PartRobot.Part(name='", part.name, "', contact=", part.contact,
+                          ", limb=", part.limb, ")");
+}
+
+std::string writePartRobot(const PartRobot& split) {
+  std::vector<std::string> names;
+  for (const PartRobot::Part& part : split.parts) names.push_back(part.name);
+  return internal::concat("PartRobot(parts=", toText(names), ")");
+}
+
+std::string writeStance(const Stance& stance) {
+  return internal::concat("Stance(part=", stance.part, ", first=", stance.first,
+                          ", behind=", stance.behind, ", height=", stance.height,
+                          ", on_ground=", stance.on_ground ? "True" : "False", ")");
+}
+
+bp::list getStances(const ContactInference& found) { return toList(found.stances); }
+
+std::string writeInference(const ContactInference& found) {
+  return internal::concat("ContactInference(frames=", found.schedule.active.cols(),
+                          ", names=", toText(found.schedule.names),
+                          ", stances=", found.stances.size(), ")");
+}
+
+ContactInference infer(const PartRobot& parts, const bp::object& motions,
+                       const MotionAnalysis& dynamics, bool exact,
+                       const DetectionSettings& settings, const bp::object& recorded) {
+  const auto own_motions = toVectorOf<ContactMotion>(motions);
+  const ContactSchedule* known =
+      recorded.is_none() ? nullptr : bp::extract<const ContactSchedule*>(recorded)();
+  return inferContacts(parts, own_motions, dynamics, exact, settings, known);
+}
+
+MotionAnalysis gather(const DynaCoM& robot, const PartRobot& parts, const bp::object& contacts,
+                      const bp::object& motions, const MotionAnalysis& analysis) {
+  return gatherParts(robot, parts, toVectorOf<ContactMotion>(contacts),
+                     toVectorOf<ContactMotion>(motions), analysis);
+}
+
+}  // namespace
+
+void exposeContactInference() {
+  using Settings = DetectionSettings;
+  bp::class_<Settings> settings(
+      "DetectionSettings",
+      "The constants of inferContacts, in seconds, metres and parts of the weight m g. Each is\n"
+      "described where C++ declares it, and docs/truth.md has what it was tried against.");
+  for (const Settings::Constant& constant : Settings::constants()) {
+    double Settings::*field = constant.second;
+    settings.add_property(
+        constant.first, bp::make_getter(field),
+        bp::make_setter(field));
+  }
+  settings
+      .def_readwrite("ground_height", &Settings::ground_height,
+                     "The ground's height under all contacts [m]; NaN if it is to be found.")
+      .add_property("ground_velocity", getter(&Settings::ground_velocity),
+                    bp::make_setter(&Settings::ground_velocity),
+                    "Velocity of the ground, a treadmill's, level [m/s]; NaN if it is to be found.")
+      .def(SettingsVisitor<Settings>());
+
+  {
+    const bp::scope split =
+        bp::class_<PartRobot>("PartRobot",
+                              "A robot whose contacts are points, see splitContacts.", bp::no_init)
+            .def_readonly("robot", &PartRobot::robot,
+                          "A DynaCoM that knows each part as a ContactPoint")
+            .add_property("parts", &getParts, "A PartRobot.Part for each of them")
+            .def(PrintVisitor<PartRobot>(&writePartRobot))
+            .def(CopyVisitor<PartRobot>());
+    bp::class_<PartRobot::Part>("Part", "A point of a contact.", bp::no_init)
+        .def_readonly("name", &PartRobot::Part::name,
+                      "Of the contact; for one of several parts `<contact>.<part>`")
+        .def_readonly("contact", &PartRobot::Part::contact,
+                      "Whose part it is: its place among the whole robot's contacts")
+        .def_readonly("limb", &PartRobot::Part::limb,
+                      "Parts on one joint, or on a joint that moves another's, share a number")
+        .def(PrintVisitor<PartRobot::Part>(&writePart))
+        .def(CopyVisitor<PartRobot::Part>());
+  }
+
+  bp::class_<Stance>("Stance",
+                     "A time in which a part of the robot is at rest: on the ground, or held in\n"
+                     "the air.",
+                     bp::no_init)
+      .def_readonly("part", &Stance::part, "Its place among PartRobot.parts")
+      .def_readonly("first", &Stance::first, "Frame")
+      .def_readonly("behind", &Stance::behind, "The frame after the last")
+      .def_readonly("height", &Stance::height, "Of the part's lowest point there [m]")
+      .def_readonly("on_ground", &Stance::on_ground, "Whether the ground may carry it there")
+      .def(PrintVisitor<Stance>(&writeStance))
+      .def(CopyVisitor<Stance>());
+
+  bp::class_<ContactInference>(
+      "ContactInference",
+      "When which part of a robot touches the ground, and where that ground is.", bp::no_init)
+      .def_readonly("schedule", &ContactInference::schedule,
+                    "Of the parts: a ContactSchedule with confidence and readiness")
+      .add_property("stances", &getStances, "All, as Stance")
+      .add_property("ground", &Rows<&ContactInference::ground>::get,
+                    "Height of the ground under each of P parts, (T, P) [m]; NaN where there is\n"
+                    "none")
+      .add_property("ground_velocity", getter(&ContactInference::ground_velocity),
+                    "As given or found, (3,) [m/s]")
+      .def(PrintVisitor<ContactInference>(&writeInference))
+      .def(CopyVisitor<ContactInference>());
+
+  bp::def("splitContacts", &splitContacts, bp::arg("robot"),
+          "The PartRobot of a DynaCoM: a Contact6D becomes a point for each of its corners, called\n"
+          "front_left, front_right, rear_left and rear_right; a ContactPoint stays what it is.\n"
+          "Raises ValueError if a contact is of another kind, NotReadyError before initialize().");
+  bp::def("gatherParts", &gather,
+          (bp::arg("robot"), bp::arg("parts"), bp::arg("contacts"), bp::arg("motions"),
+           bp::arg("analysis")),
+          "The MotionAnalysis of a robot from that of its parts, whose contacts become its parts.\n"
+          "contacts, motions: of computeContactMotions for the robot and for its parts. Raises\n"
+          "ValueError if sizes differ.");
+  bp::def("inferContacts", &infer,
+          (bp::arg("parts"), bp::arg("motions"), bp::arg("dynamics"), bp::arg("exact"),
+           bp::arg("settings") = Settings(), bp::arg("recorded") = bp::object()),
+          "The ContactInference of a motion: the cheapest path through time of sets of active\n"
+          "parts, by where they are, how they move, and what they cannot give of the wrench that\n"
+          "the motion needs. motions: of computeContactMotions for parts.robot; dynamics: of\n"
+          "analyzeMotion for it, with whatever schedule; exact: whether the motion is free of\n"
+          "noise; recorded: a ContactSchedule of the whole robot's contacts, within which the\n"
+          "parts are found. Raises ValueError if settings are not valid or sizes differ.");
+}
+
+}  // namespace dynacom::python

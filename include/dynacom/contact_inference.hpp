@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "dynacom/contact_parts.hpp"
+#include "dynacom/detection_settings.hpp"
+
+namespace dynacom {
+
+/// A time in which a part of the robot is at rest: on the ground, or held in the air.
+struct Stance {
+  std::size_t part;           ///< index of PartRobot::parts
+  Eigen::Index first, behind; ///< frames
+  double height;              ///< of the part's lowest point there [m]
+  bool on_ground;             ///< whether the ground may carry the part there
+};
+
+/// When which part of a robot touches the ground, and where that ground is.
+struct DYNACOM_EXPORT ContactInference {
+  ContactSchedule schedule;  ///< of the parts, with confidence and readiness
+  std::vector<Stance> stances;
+  /// Height of the ground under each part, parts × frames [m]: that of the stance to which a frame
+  /// belongs, where that is on the ground; NaN where there is none.
+  Eigen::MatrixXd ground;
+  /// Velocity of the ground, as given or found, in the world [m/s].
+  Eigen::Vector3d ground_velocity = Eigen::Vector3d::Zero();
+};
+
+/// Finds the contacts of a motion by what it needs: for each frame and each set of parts that may
+/// be active, it costs where they are and how fast, and what they cannot give of the wrench that
+/// the motion needs; changes cost, too. The cheapest path through time is the schedule (Viterbi
+/// 1967), and the probabilities over the same costs are its confidence (forward-backward, Rabiner
+/// 1989). Parts carry load on a ground that was landed on, or that is as high as such a one: see
+/// DetectionSettings, whose constants are all there are.
+/// @param parts     of splitContacts()
+/// @param motions   of computeContactMotions() for the parts
+/// @param dynamics  of analyzeMotion() for the parts, with whatever schedule
+/// @param exact     whether the motion is free of noise: planned, or simulated
+/// @param recorded  of the whole robot's contacts, by whose names and numbers of parts: if given,
+///                  contacts are active as it says, and only which of their parts are is found; null
+///                  otherwise
+/// @throws std::invalid_argument if settings are not valid, or sizes differ, or there are more than
+///         32 parts
+DYNACOM_EXPORT ContactInference inferContacts(const PartRobot& parts,
+                                              const std::vector<ContactMotion>& motions,
+                                              const MotionAnalysis& dynamics, bool exact,
+                                              const DetectionSettings& settings = {},
+                                              const ContactSchedule* recorded = nullptr);
+
+}  // namespace dynacom

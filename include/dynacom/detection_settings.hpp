@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <iosfwd>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dynacom/export.hpp"
+
+namespace dynacom {
+
+/// The constants of inferContacts(), all in seconds, metres and parts of the weight m g: none is
+/// about frames. docs/truth.md has what each was tried against, and what becomes of the figures when
+/// it is 0.6 or 1.6 times as large.
+///
+/// Costs are dimensionless: 1 is what a measure costs that is as large as its scale. Scales with a
+/// least and a greatest are taken from the motion itself, between these.
+struct DYNACOM_EXPORT DetectionSettings {
+  // Stances: where a point is at rest, and at which height.
+
+  /// Speed [m/s] below which a point is at rest: this part of how fast it gets (the 95th percentile
+  /// of its speeds above `moving_speed`), between a least and a greatest.
+  double rest_speed_part = 0.2, rest_speed_least = 0.1, rest_speed_greatest = 0.2;
+  /// The same bounds for exact motions, whose points are at rest where they stand [m/s].
+  double exact_rest_speed_least = 0.02, exact_rest_speed_greatest = 0.05;
+  /// From where on a point moves [m/s].
+  double moving_speed = 0.1;
+  /// Of a point's horizontal speed this part counts: soles drift more than they float.
+  double horizontal_part = 0.4;
+  /// How long a point is at rest at least [s].
+  double rest_duration = 0.03;
+  /// Rests between which a point moves no faster than twice the above, and whose heights differ by
+  /// no more than this, are one [m].
+  double same_rest = 0.01;
+
+  // Which stances are on the ground.
+
+  /// A stance that was landed on from above, or left upward, by this much is on the ground [m].
+  double landing_height = 0.015;
+  /// And so is one that is within this of such a one, or of the lowest [m]; of exact motions within
+  /// the second.
+  double same_ground = 0.035, exact_same_ground = 0.01;
+
+  // Scales.
+
+  /// Of heights above the rest: their scatter at rest, between these [m].
+  double height_scale_least = 0.001, height_scale_greatest = 0.02;
+  /// Of speeds: this many times the median speed at rest, between these [m/s].
+  double speed_scale_part = 3., speed_scale_least = 0.01, speed_scale_greatest = 0.2;
+  /// Of forces [m g]: this many for each m/s of the scale of speeds, between these.
+  double force_scale_part = 0.3, force_scale_least = 0.01, force_scale_greatest = 0.1;
+  /// Of moments, for each unit of the scale of forces: the lever [m].
+  double lever = 0.33;
+
+  // Costs.
+
+  /// What being in contact is worth, for a second: a point costs as much less.
+  double contact_gain = 9.;
+  /// The greatest cost of heights and speeds in their own scales.
+  double fine_greatest = 12.;
+  /// The same in absolute scales, [m] and [m/s], with a factor, and the greatest cost.
+  double coarse_factor = 3., coarse_height = 0.05, coarse_speed = 0.7, coarse_greatest = 50.;
+  /// How far below its rest a point is pressed, and not sunk [m].
+  double pressed_depth = 0.07;
+  /// Of what contacts cannot give, in its own scales, the greatest cost; and of [m g] and [m g m],
+  /// in absolute scales, with a factor and without a greatest cost.
+  double missing_greatest = 15., missing_factor = 2., missing_force = 0.1, missing_torque = 0.05;
+  /// How much the cost of the dynamics counts.
+  double dynamics_weight = 1.2;
+  /// What each further point of a limb counts, where the first counts 1.
+  double further_points = 0.5;
+  /// How many of all these costs make a second [1/s].
+  double rate = 30.;
+  /// What the beginning or end of a contact costs.
+  double change = 4.5;
+
+  /// The ground's height under all contacts [m]; NaN if it is to be found.
+  double ground_height = std::numeric_limits<double>::quiet_NaN();
+  /// Velocity of the ground, a treadmill's, in the world, level [m/s]; NaN if it is to be found.
+  Eigen::Vector3d ground_velocity =
+      Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+
+  /// The constants: all fields but those of the ground, by name.
+  using Constant = std::pair<const char*, double DetectionSettings::*>;
+  static const std::vector<Constant>& constants();
+
+  /// @throws std::invalid_argument naming the first field out of its range: constants are > 0, and
+  ///         none that is called least is greater than its greatest; the ground's velocity is level
+  void validate() const;
+  std::string to_string() const;
+  bool operator==(const DetectionSettings& other) const;
+  bool operator!=(const DetectionSettings& other) const { return !(*this == other); }
+};
+
+DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const DetectionSettings& settings);
+
+}  // namespace dynacom

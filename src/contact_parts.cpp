@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/contact_parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "check.hpp"
+#include "cone_usage.hpp"
+#include "contact_frame.hpp"
+#include "nan.hpp"
+
+namespace dynacom {
+
+using internal::kNaN;
+using internal::throwInvalid;
+
+namespace {
+
+std::string nameCorner(const Eigen::Vector2d& corner) {
+  return std::string(corner.x() > 0. ? "front" : "rear") + (corner.y() > 0. ? "_left" : "_right");
+}
+
+// A frame of the model at a corner of a surface; its name.
+std::string addCornerFrame(pinocchio::Model& model, const pinocchio::Frame& surface,
+                           const std::string& part, const Eigen::Vector2d& corner) {
+  std::string name = part;
+  while (model.existFrame(name)) name += '_';
+  const pinocchio::SE3 offset(Eigen::Matrix3d::Identity(),
+                              Eigen::Vector3d(corner.x(), corner.y(), 0.));
+  model.addFrame(pinocchio::Frame(name, surface.parentJoint, surface.placement * offset,
+                                  pinocchio::OP_FRAME));
+  return name;
+}
+
+// Numbers for joints, the same for those of which one moves the other.
+class Limbs {
+ public:
+  explicit Limbs(const pinocchio::Model& model) : model_(model) {}
+
+  void add(pinocchio::JointIndex joint) { numbers_.emplace(joint, -1); }
+
+  int find(pinocchio::JointIndex joint) {
+    pinocchio::JointIndex root = joint;
+    for (auto parent = joint; parent > 0; parent = model_.parents[parent])
+      if (numbers_.count(parent) > 0) root = parent;
+    int& number = numbers_[root];
+    if (number < 0) number = count_++;
+    return number;
+  }
+
+ private:
+  const pinocchio::Model& model_;
+  std::map<pinocchio::JointIndex, int> numbers_;
+  int count_ = 0;
+};
+
+// A contact as a whole, from the forces of its parts in one frame.
+class Gatherer {
+ public:
+  Gatherer(const DynaCoM& robot, const std::string& name)
+      : contact_(robot.getContact(name)->clone()),
+        mu_(internal::findFriction(*contact_)),
+        minimal_force_(robot.getMinimalVerticalForce()),
+        force_(Eigen::VectorXd::Zero(contact_->cols())) {}
+
+  void write(Eigen::Index frame, const DynaCoM::Vector6& wrench, MotionAnalysis::Contact& result) {
+    force_ = wrench.head(force_.size());
+    contact_->applyForce(force_);
+    const bool loaded = force_[2] >= minimal_force_;
+    const auto usage = [&](double value) { return loaded || std::isnan(value) ? value : 0.; };
+    result.wrench.col(frame) = wrench;
+    if (loaded)
+      result.cop.col(frame) = contact_->getCoP();
+    else
+      result.cop.col(frame).setConstant(kNaN);
+    result.friction_usage[frame] = usage(contact_->getFrictionUsage());
+    result.yaw_usage[frame] = usage(contact_->getYawUsage());
+    result.cop_margin[frame] = loaded ? contact_->getCoPMargin() : kNaN;
+    result.cone_usage[frame] = internal::findConeUsage(force_.head<3>(), mu_, minimal_force_);
+  }
+
+ private:
+  const std::shared_ptr<ContactBase> contact_;
+  const double mu_, minimal_force_;
+  Eigen::VectorXd force_;
+};
+
+MotionAnalysis::Contact makeContact(const std::string& name, Eigen::Index frames) {
+  MotionAnalysis::Contact contact;
+  contact.name = name;
+  contact.active.setConstant(frames, false);
+  contact.wrench.setZero(6, frames);
+  contact.vertical_force.setZero(frames);
+  contact.cop.setConstant(2, frames, kNaN);
+  for (Eigen::VectorXd* values : {&contact.friction_usage, &contact.cone_usage, &contact.yaw_usage,
+                                  &contact.cop_margin})
+    values->setConstant(frames, kNaN);
+  return contact;
+}
+
+}  // namespace
+
+PartRobot splitContacts(const DynaCoM& robot) {
+  if (!robot.isInitialized())
+    throw NotReadyError("DynaCoM is used by splitContacts before initialize()");
+  const std::vector<std::string> names = robot.getKnownContacts();
+  pinocchio::Model model = robot.getModel();
+  std::vector<PartRobot::Part> parts;
+  std::vector<ContactPointSettings> settings;
+  std::vector<pinocchio::JointIndex> joints;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const ContactBase& contact = *robot.getContact(names[k]);
+    const pinocchio::Frame frame = internal::getFrame(robot.getModel(), contact, names[k]);
+    if (const auto* point = dynamic_cast<const ContactPoint*>(&contact)) {
+      parts.push_back({names[k], k, 0});
+      settings.push_back(point->getSettings());
+      joints.push_back(frame.parentJoint);
+    } else if (const auto* surface = dynamic_cast<const Contact6D*>(&contact)) {
+      const Eigen::Matrix2Xd corners = surface->getCorners();
+      for (Eigen::Index i = 0; i < corners.cols(); ++i) {
+        const std::string name = names[k] + "." + nameCorner(corners.col(i));
+        ContactPointSettings part;
+        part.mu = surface->getSettings().mu;
+        part.weights =
+            std::sqrt(double(corners.cols())) * surface->getSettings().weights.head<3>();
+        part.world_aligned = true;
+        part.frame_name = addCornerFrame(model, frame, name, corners.col(i));
+        parts.push_back({name, k, 0});
+        settings.push_back(part);
+        joints.push_back(frame.parentJoint);
+      }
+    } else {
+      throwInvalid("contact '", names[k],
+                   "' must be a ContactPoint or a Contact6D to be taken apart, got another kind");
+    }
+  }
+  Limbs limbs(model);
+  for (const pinocchio::JointIndex joint : joints) limbs.add(joint);
+  for (std::size_t k = 0; k < parts.size(); ++k) parts[k].limb = limbs.find(joints[k]);
+
+  PartRobot split{DynaCoM(model), std::move(parts)};
+  split.robot.setGroundHeight(robot.getGroundHeight());
+  split.robot.setMinimalVerticalForce(robot.getMinimalVerticalForce());
+  split.robot.setWrenchWeights(robot.getWrenchWeights());
+  split.robot.setMaximalIterations(robot.getMaximalIterations());
+  for (std::size_t k = 0; k < split.parts.size(); ++k)
+    split.robot.addContact(std::make_shared<ContactPoint>(settings[k]), split.parts[k].name);
+  return split;
+}
+
+MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
+                           const std::vector<ContactMotion>& contacts,
+                           const std::vector<ContactMotion>& motions, MotionAnalysis analysis) {
+  const std::vector<std::string> names = robot.getKnownContacts();
+  internal::requireSize("contacts", contacts.size(), names.size(), "contacts of the robot");
+  internal::requireSize("motions", motions.size(), parts.parts.size(), "parts");
+  internal::requireSize("analysis.contacts", analysis.contacts.size(), parts.parts.size(), "parts");
+  const Eigen::Index frames = analysis.time.size();
+  for (const auto* list : {&contacts, &motions})
+    for (const ContactMotion& moved : *list)
+      internal::requireSize(moved.name.c_str(), moved.height.size(), frames, "frames");
+
+  std::vector<MotionAnalysis::Contact> gathered;
+  std::vector<Gatherer> gatherers;
+  for (const std::string& name : names) {
+    gathered.push_back(makeContact(name, frames));
+    gatherers.emplace_back(robot, name);
+  }
+  const auto findRotation = [](const ContactMotion& moved, Eigen::Index frame) {
+    return Eigen::Quaterniond(moved.rotation.col(frame)).toRotationMatrix();
+  };
+  std::vector<DynaCoM::Vector6> wrenches(names.size());
+  for (Eigen::Index frame = 0; frame < frames; ++frame) {
+    for (DynaCoM::Vector6& wrench : wrenches) wrench.setZero();
+    for (std::size_t k = 0; k < parts.parts.size(); ++k) {
+      const MotionAnalysis::Contact& part = analysis.contacts[k];
+      if (!part.active[frame]) continue;
+      const std::size_t owner = parts.parts[k].contact;
+      gathered[owner].active[frame] = true;
+      gathered[owner].vertical_force[frame] += part.vertical_force[frame];
+      // In the world, about the contact's origin.
+      const Eigen::Vector3d force =
+          findRotation(motions[k], frame) * part.wrench.col(frame).head<3>();
+      const Eigen::Vector3d lever = motions[k].position.col(frame) -
+                                    contacts[owner].position.col(frame);
+      wrenches[owner].head<3>() += force;
+      wrenches[owner].tail<3>() += lever.cross(force);
+    }
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      if (!gathered[k].active[frame]) continue;
+      const Eigen::Matrix3d axes = findRotation(contacts[k], frame).transpose();
+      DynaCoM::Vector6 wrench;
+      wrench << axes * wrenches[k].head<3>(), axes * wrenches[k].tail<3>();
+      gatherers[k].write(frame, wrench, gathered[k]);
+    }
+  }
+  analysis.parts = std::move(analysis.contacts);
+  analysis.contacts = std::move(gathered);
+  return analysis;
+}
+
+ContactSchedule gatherParts(const DynaCoM& robot, const PartRobot& parts,
+                            const ContactSchedule& schedule) {
+  internal::requireSize("schedule.names", schedule.names.size(), parts.parts.size(), "parts");
+  const Eigen::Index frames = schedule.active.cols();
+  schedule.validate(frames);
+  ContactSchedule gathered;
+  gathered.names = robot.getKnownContacts();
+  const auto count = static_cast<Eigen::Index>(gathered.names.size());
+  gathered.active.setConstant(count, frames, false);
+  if (schedule.confidence.size() > 0) gathered.confidence.setZero(count, frames);
+  for (std::size_t k = 0; k < parts.parts.size(); ++k) {
+    const auto owner = static_cast<Eigen::Index>(parts.parts[k].contact);
+    const auto part = static_cast<Eigen::Index>(k);
+    gathered.active.row(owner) = gathered.active.row(owner) || schedule.active.row(part);
+    if (schedule.confidence.size() > 0)
+      gathered.confidence.row(owner) =
+          gathered.confidence.row(owner).cwiseMax(schedule.confidence.row(part));
+  }
+  return gathered;
+}
+
+}  // namespace dynacom

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "cone_projection.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dynacom::internal {
+
+namespace {
+
+// An edge whose slope along the residual is less than this part of the wrench brings nothing: costs
+// are told apart by hundredths of the weight.
+constexpr double kGain = 1e-6;
+// A direction whose part outside the span of the others is smaller than this is taken to be within.
+constexpr double kDependent = 1e-10;
+// Each round adds an edge, and the distance decreases; there are few rounds in practice.
+constexpr int kRounds = 60;
+
+}  // namespace
+
+ConeProjection::Vector6 ConeProjection::direction(const Edge& edge, const Eigen::Matrix3Xd& levers,
+                                                  const std::vector<double>& mu) const {
+  const double friction = mu[static_cast<std::size_t>(edge.point)];
+  const Eigen::Vector3d force(edge.x * friction, edge.y * friction, 1.);
+  const Eigen::Vector3d lever = levers.col(edge.point);
+  Vector6 wrench;
+  wrench << force, lever.cross(force) / lever_;
+  return wrench / wrench.norm();
+}
+
+// The factors of least squares, by Cholesky's decomposition of the normal equations; false if the
+// last edge is within the span of the others.
+bool ConeProjection::solve() {
+  std::array<std::array<double, kEdges>, kEdges> L;
+  std::array<double, kEdges> y;
+  for (int i = 0; i < count_; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double sum = columns_.col(i).dot(columns_.col(j));
+      for (int k = 0; k < j; ++k) sum -= L[i][k] * L[j][k];
+      if (i == j) {
+        if (!(sum > kDependent)) return false;
+        L[i][i] = std::sqrt(sum);
+      } else {
+        L[i][j] = sum / L[j][j];
+      }
+    }
+    double rhs = columns_.col(i).dot(target_);
+    for (int k = 0; k < i; ++k) rhs -= L[i][k] * y[k];
+    y[i] = rhs / L[i][i];
+  }
+  for (int i = count_ - 1; i >= 0; --i) {
+    double value = y[i];
+    for (int k = i + 1; k < count_; ++k) value -= L[k][i] * solution_[k];
+    solution_[i] = value / L[i][i];
+  }
+  return true;
+}
+
+void ConeProjection::drop(int position) {
+  for (int k = position + 1; k < count_; ++k) {
+    edges_[k - 1] = edges_[k];
+    factors_[k - 1] = factors_[k];
+    columns_.col(k - 1) = columns_.col(k);
+  }
+  --count_;
+}
+
+ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
+                                                 const Eigen::Matrix3Xd& levers,
+                                                 const std::vector<double>& mu,
+                                                 std::uint32_t set) {
+  target_ << wrench.head<3>(), wrench.tail<3>() / lever_;
+  const double size = target_.norm();
+
+  // What is left of the last answer, as far as its points are there.
+  int kept = 0;
+  for (int k = 0; k < count_; ++k)
+    if (set >> edges_[k].point & 1u) edges_[kept++] = edges_[k];
+  count_ = kept;
+  for (int k = 0; k < count_; ++k) {
+    columns_.col(k) = direction(edges_[k], levers, mu);
+    factors_[k] = 0.;
+  }
+  while (count_ > 0 && !solve()) drop(count_ - 1);
+  for (;;) {  // of the old edges only those that push
+    const auto least = std::min_element(solution_.begin(), solution_.begin() + count_);
+    if (count_ == 0 || *least > 0.) break;
+    drop(static_cast<int>(least - solution_.begin()));
+    solve();
+  }
+  std::copy_n(solution_.begin(), count_, factors_.begin());
+
+  Vector6 residual;
+  for (int round = 0; round < kRounds; ++round) {
+    residual = target_;
+    for (int k = 0; k < count_; ++k) residual -= factors_[k] * columns_.col(k);
+    if (size == 0.) break;
+
+    // The best edge of each point, and the best of these.
+    const Eigen::Vector3d force = residual.head<3>(), torque = residual.tail<3>() / lever_;
+    Edge best = {-1, 0, 0};
+    double slope = kGain * size;
+    Vector6 column = Vector6::Zero();
+    for (std::uint32_t rest = set; rest != 0; rest &= rest - 1) {
+      const int point = __builtin_ctz(rest);
+      const Eigen::Vector3d pull = force + torque.cross(Eigen::Vector3d(levers.col(point)));
+      const double friction = mu[static_cast<std::size_t>(point)];
+      if (friction * (std::abs(pull.x()) + std::abs(pull.y())) + pull.z() <= 0.) continue;
+      const Edge edge = {point, pull.x() < 0. ? -1 : 1, pull.y() < 0. ? -1 : 1};
+      const Vector6 candidate = direction(edge, levers, mu);
+      const double value = candidate.dot(residual);
+      if (value > slope && std::find(edges_.begin(), edges_.begin() + count_, edge) ==
+                               edges_.begin() + count_) {
+        best = edge, slope = value, column = candidate;
+      }
+    }
+    if (best.point < 0 || count_ == kEdges) break;
+    edges_[count_] = best;
+    columns_.col(count_) = column;
+    factors_[count_] = 0.;
+    ++count_;
+    if (!solve()) {
+      drop(count_ - 1);
+      break;
+    }
+    // On the way to the new factors, whichever becomes zero first is left.
+    for (;;) {
+      double step = 1.;
+      int leaving = -1;
+      for (int k = 0; k < count_; ++k) {
+        if (solution_[k] > 0.) continue;
+        const double part = factors_[k] / std::max(factors_[k] - solution_[k],
+                                                   std::numeric_limits<double>::min());
+        if (leaving < 0 || part < step) step = part, leaving = k;
+      }
+      if (leaving < 0) break;
+      for (int k = 0; k < count_; ++k) factors_[k] += step * (solution_[k] - factors_[k]);
+      drop(leaving);
+      if (count_ == 0) break;
+      solve();
+    }
+    std::copy_n(solution_.begin(), count_, factors_.begin());
+  }
+  return {residual.head<3>().norm(), residual.tail<3>().norm() * lever_};
+}
+
+}  // namespace dynacom::internal

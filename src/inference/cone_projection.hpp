@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace dynacom::internal {
+
+/// The wrench closest to a given one among those that points can give together, each of which
+/// pushes within the friction pyramid |f_x|, |f_y| ≤ μ f_z in the world's axes.
+///
+/// Such wrenches are sums of the pyramids' edges with factors ≥ 0, so that the closest one is a
+/// problem of non-negative least squares, solved by the active-set method of Lawson and Hanson
+/// (Solving Least Squares Problems, 1974, chapter 23). Of each point only that edge is looked at
+/// which goes furthest along the residual: its signs are those of the residual's pull on the point.
+class ConeProjection {
+ public:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+  /// What of a wrench cannot be given.
+  struct Residual {
+    double force, torque;  // norms, of the parts of a wrench as it was given
+  };
+
+  /// @param lever  ℓ: closest is what has the least ‖force‖² + ‖moment‖²/ℓ² [m]
+  explicit ConeProjection(double lever) : lever_(lever) {}
+
+  /// @param wrench    (force, moment) about some point
+  /// @param levers    from that point to the points that may push
+  /// @param mu        of each
+  /// @param set       a bit for each point that pushes, of which there are at most 32
+  /// The edges that made up the last answer are tried first: consecutive frames have much in common.
+  Residual project(const Vector6& wrench, const Eigen::Matrix3Xd& levers,
+                   const std::vector<double>& mu, std::uint32_t set);
+
+ private:
+  struct Edge {
+    int point;
+    int x, y;  // signs
+    bool operator==(const Edge& other) const {
+      return point == other.point && x == other.x && y == other.y;
+    }
+  };
+
+  Vector6 direction(const Edge& edge, const Eigen::Matrix3Xd& levers,
+                    const std::vector<double>& mu) const;
+  bool solve();
+  void drop(int position);
+
+  static constexpr int kEdges = 6;  // more do not make a wrench, but for one that is dropped
+
+  const double lever_;
+  int count_ = 0;
+  std::array<Edge, kEdges> edges_ = {};
+  Eigen::Matrix<double, 6, kEdges> columns_;
+  std::array<double, kEdges> factors_ = {};
+  std::array<double, kEdges> solution_ = {};
+  Vector6 target_;
+};
+
+}  // namespace dynacom::internal

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/contact_inference.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "../check.hpp"
+#include "../nan.hpp"
+#include "dynacom/contact_point.hpp"
+#include "schedule_path.hpp"
+
+namespace dynacom {
+
+using Eigen::Index;
+using internal::kNaN;
+
+namespace {
+
+constexpr std::size_t kMaximalParts = 32;
+// What forces are parts of where there is no gravity [m/s²].
+constexpr double kStandardGravity = 9.81;
+
+// A contact takes its load on, and gives it back, over so long [s], from and to this readiness.
+constexpr double kRamp = 0.1, kLeastReadiness = 0.2;
+
+// How readily parts bear load: less where their contact has just begun, or is about to end.
+Eigen::MatrixXd findReadiness(const ContactSchedule::Matrix& active, const Eigen::VectorXd& time) {
+  Eigen::MatrixXd readiness = Eigen::MatrixXd::Ones(active.rows(), active.cols());
+  const auto ramp = [](double since) {
+    return kLeastReadiness + (1. - kLeastReadiness) * std::clamp(since / kRamp, 0., 1.);
+  };
+  for (Index part = 0; part < active.rows(); ++part) {
+    double begin = -std::numeric_limits<double>::infinity(), end = -begin;
+    for (Index frame = 0; frame < time.size(); ++frame) {
+      if (!active(part, frame)) begin = time[frame];
+      readiness(part, frame) = std::min(readiness(part, frame), ramp(time[frame] - begin));
+    }
+    for (Index frame = time.size(); frame-- > 0;) {
+      if (!active(part, frame)) end = time[frame];
+      readiness(part, frame) = std::min(readiness(part, frame), ramp(end - time[frame]));
+    }
+  }
+  return readiness;
+}
+
+internal::KnownContacts findKnown(const PartRobot& parts, const ContactSchedule& recorded,
+                                  Index frames) {
+  recorded.validate(frames);
+  internal::KnownContacts known;
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < parts.parts.size(); ++k) {
+    const std::size_t contact = parts.parts[k].contact;
+    if (contact >= known.masks.size()) {
+      known.masks.resize(contact + 1, 0);
+      names.resize(contact + 1);
+    }
+    known.masks[contact] |= 1u << k;
+    names[contact] = parts.parts[k].name;
+  }
+  known.active.setConstant(Index(known.masks.size()), frames, false);
+  for (std::size_t row = 0; row < recorded.names.size(); ++row)
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      const std::string& name = recorded.names[row];
+      if (names[k] == name || names[k].rfind(name + ".", 0) == 0)
+        known.active.row(Index(k)) = recorded.active.row(Index(row));
+    }
+  return known;
+}
+
+}  // namespace
+
+ContactInference inferContacts(const PartRobot& parts, const std::vector<ContactMotion>& motions,
+                               const MotionAnalysis& dynamics, bool exact,
+                               const DetectionSettings& settings,
+                               const ContactSchedule* recorded) {
+  settings.validate();
+  const Eigen::VectorXd& time = dynamics.time;
+  const Index frames = time.size();
+  const std::size_t count = parts.parts.size();
+  internal::requireSize("motions", motions.size(), count, "parts");
+  if (count > kMaximalParts)
+    internal::throwInvalid("contacts must have at most ", kMaximalParts, " parts, got ", count);
+  for (const auto* values : {&dynamics.com, &dynamics.ground_force, &dynamics.ground_torque})
+    internal::requireSize("dynamics", values->cols(), frames, "frames");
+
+  std::vector<internal::PointTrack> tracks;
+  tracks.reserve(count);
+  const auto addTrack = [&](std::size_t k, const Eigen::Matrix3Xd& velocity) {
+    const auto contact = std::dynamic_pointer_cast<const ContactPoint>(
+        parts.robot.getContact(parts.parts[k].name));
+    tracks.push_back({parts.parts[k].limb, contact ? contact->getSettings().mu : 0.,
+                      motions[k].position, velocity});
+  };
+  for (std::size_t k = 0; k < count; ++k) {
+    for (const auto* values : {&motions[k].position, &motions[k].velocity})
+      internal::requireSize("motions", values->cols(), frames, "frames (as many as dynamics)");
+    addTrack(k, motions[k].velocity);
+  }
+
+  // As the ground sees them, where that moves.
+  const Eigen::Vector3d ground_velocity = settings.ground_velocity.array().isNaN().any()
+                                              ? internal::findGroundVelocity(tracks)
+                                              : settings.ground_velocity;
+  std::vector<Eigen::Matrix3Xd> velocities;
+  if (!ground_velocity.isZero(0.)) {
+    for (const internal::PointTrack& track : tracks)
+      velocities.push_back(track.velocity.colwise() - ground_velocity);
+    tracks.clear();
+    for (std::size_t k = 0; k < count; ++k) addTrack(k, velocities[k]);
+  }
+
+  const std::vector<internal::Rests> rests = internal::findRests(tracks, time, exact, settings);
+  const internal::CostScales scales = internal::findScales(tracks, rests, time, settings);
+  const internal::WrenchTrack wrench{dynamics.com, dynamics.ground_force, dynamics.ground_torque};
+  const double gravity = -parts.robot.getSettings().gravity.z();
+  const double weight = parts.robot.getMass() * (gravity > 0. ? gravity : kStandardGravity);
+  internal::KnownContacts known;
+  if (recorded) known = findKnown(parts, *recorded, frames);
+  const internal::SchedulePath path = internal::findSchedulePath(
+      tracks, rests, scales, wrench, weight, time, settings, recorded ? &known : nullptr);
+
+  ContactInference found;
+  found.ground_velocity = ground_velocity;
+  found.schedule.active.resize(Index(count), frames);
+  found.schedule.confidence = path.probability;
+  found.ground.setConstant(Index(count), frames, kNaN);
+  for (std::size_t k = 0; k < count; ++k) {
+    found.schedule.names.push_back(parts.parts[k].name);
+    for (Index frame = 0; frame < frames; ++frame) {
+      found.schedule.active(Index(k), frame) = path.sets[static_cast<std::size_t>(frame)] >> k & 1u;
+      const int owner = rests[k].owner[static_cast<std::size_t>(frame)];
+      if (owner < 0) continue;
+      const internal::Rest& rest = rests[k].list[static_cast<std::size_t>(owner)];
+      if (rest.on_ground || found.schedule.active(Index(k), frame))
+        found.ground(Index(k), frame) = rest.height;
+    }
+    for (const internal::Rest& rest : rests[k].list)
+      found.stances.push_back({k, rest.first, rest.behind, rest.height, rest.on_ground});
+  }
+  found.schedule.readiness = findReadiness(found.schedule.active, time);
+  return found;
+}
+
+}  // namespace dynacom

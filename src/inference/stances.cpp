@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "stances.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+namespace dynacom::internal {
+
+namespace {
+
+using Eigen::Index;
+
+// What of a motion's frames scales are taken from: those this close to one in which a point moves,
+// so that it does not matter for how long the robot stands before and after [s].
+constexpr double kNearMovement = 0.5;
+// A normal distribution's standard deviation, in medians of absolute deviations.
+constexpr double kDeviation = 1.4826;
+// How fast a point gets, as a quantile of its speeds.
+constexpr double kFast = 0.95;
+
+double quantile(std::vector<double>& values, double part) {
+  const auto nth = values.begin() + std::lround(part * double(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+// Speeds as rests see them.
+Eigen::VectorXd findSpeeds(const PointTrack& point, double horizontal_part) {
+  return (point.velocity.row(2).array().square() +
+          horizontal_part * horizontal_part *
+              point.velocity.topRows<2>().colwise().squaredNorm().array())
+      .sqrt();
+}
+
+Rest makeRest(const PointTrack& point, Index first, Index behind) {
+  std::vector<double> heights(static_cast<std::size_t>(behind - first));
+  for (Index frame = first; frame < behind; ++frame)
+    heights[static_cast<std::size_t>(frame - first)] = point.position(2, frame);
+  return {first, behind, quantile(heights, 0.5), false};
+}
+
+// Where a point is slow for long enough.
+std::vector<Rest> findRuns(const PointTrack& point, const Eigen::VectorXd& speed,
+                           const Eigen::VectorXd& time, double slow, double duration) {
+  std::vector<Rest> rests;
+  const Index frames = time.size();
+  for (Index first = 0, behind = 0; first < frames; first = behind + 1) {
+    behind = first;
+    while (behind < frames && speed[behind] < slow) ++behind;
+    if (behind == first) continue;
+    const double step = frames > 1 ? (time[frames - 1] - time[0]) / double(frames - 1) : 0.;
+    if (time[behind - 1] - time[first] + step >= duration || behind - first == frames)
+      rests.push_back(makeRest(point, first, behind));
+  }
+  return rests;
+}
+
+// Makes one of neighbours that are the same rest.
+void mergeRests(const PointTrack& point, const Eigen::VectorXd& speed, double slow, double same,
+                std::vector<Rest>& rests) {
+  std::vector<Rest> merged;
+  for (const Rest& rest : rests) {
+    if (!merged.empty()) {
+      Rest& last = merged.back();
+      const Index between = rest.first - last.behind;
+      const double fastest =
+          between > 0 ? speed.segment(last.behind, between).maxCoeff() : 0.;
+      if (fastest < 2. * slow && std::abs(rest.height - last.height) <= same) {
+        last = makeRest(point, last.first, rest.behind);
+        continue;
+      }
+    }
+    merged.push_back(rest);
+  }
+  rests.swap(merged);
+}
+
+// Until it is fastest between two rests, a point belongs to the first.
+std::vector<int> findOwners(const std::vector<Rest>& rests, const Eigen::VectorXd& speed) {
+  std::vector<int> owner(static_cast<std::size_t>(speed.size()), rests.empty() ? -1 : 0);
+  for (std::size_t k = 1; k < rests.size(); ++k) {
+    const Index from = rests[k - 1].behind, between = rests[k].first - from;
+    Index fastest = 0;
+    if (between > 0) speed.segment(from, between).maxCoeff(&fastest);
+    std::fill(owner.begin() + from + fastest, owner.end(), static_cast<int>(k));
+  }
+  return owner;
+}
+
+// How far a point was above a rest since it was last as low, or will be until it is as low again.
+double rise(const PointTrack& point, const std::vector<Rest>& rests, std::size_t k, int direction,
+            double same) {
+  double highest = -std::numeric_limits<double>::infinity();
+  const double height = rests[k].height;
+  for (auto other = std::ptrdiff_t(k);; other += direction) {
+    // From one rest to the next one in this direction, or the end of the motion.
+    const auto next = other + direction;
+    const bool ends = next < 0 || next == std::ptrdiff_t(rests.size());
+    const Rest& rest = rests[static_cast<std::size_t>(other)];
+    Index from, behind;
+    if (direction > 0) {
+      from = rest.behind;
+      behind = ends ? point.position.cols() : rests[static_cast<std::size_t>(next)].first;
+    } else {
+      from = ends ? 0 : rests[static_cast<std::size_t>(next)].behind;
+      behind = rest.first;
+    }
+    if (behind > from)
+      highest = std::max(highest, point.position.row(2).segment(from, behind - from).maxCoeff());
+    if (ends || rests[static_cast<std::size_t>(next)].height <= height + same) break;
+    highest = std::max(highest, rests[static_cast<std::size_t>(next)].height);
+  }
+  return highest - height;
+}
+
+// Velocities of which the ground may have one are counted in squares of this size [m/s].
+constexpr double kVelocityStep = 0.1;
+// Low is what is no higher than this above a point's lowest place, but for the lowest twentieth [m].
+constexpr double kLow = 0.03, kLowest = 0.05;
+// The ground moves if its velocity is this many times as frequent as rest, in a part of the frames.
+constexpr double kMoreFrequent = 3., kFrequent = 0.1;
+
+}  // namespace
+
+Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
+  std::map<std::pair<long, long>, std::vector<Eigen::Vector2d>> squares;
+  Index all = 0;
+  for (const PointTrack& point : points) {
+    const Index frames = point.position.cols();
+    all += frames;
+    if (frames == 0) continue;
+    std::vector<double> heights(static_cast<std::size_t>(frames));
+    for (Index frame = 0; frame < frames; ++frame)
+      heights[static_cast<std::size_t>(frame)] = point.position(2, frame);
+    const double low = quantile(heights, kLowest) + kLow;
+    for (Index frame = 0; frame < frames; ++frame) {
+      const Eigen::Vector3d velocity = point.velocity.col(frame);
+      if (point.position(2, frame) > low || std::abs(velocity.z()) > kVelocityStep) continue;
+      squares[{std::lround(velocity.x() / kVelocityStep), std::lround(velocity.y() / kVelocityStep)}]
+          .push_back(velocity.head<2>());
+    }
+  }
+  const std::size_t at_rest = squares[{0, 0}].size();
+  const auto most = std::max_element(squares.begin(), squares.end(), [](const auto& a, const auto& b) {
+    return a.second.size() < b.second.size();
+  });
+  Eigen::Vector3d ground = Eigen::Vector3d::Zero();
+  if (double(most->second.size()) <= kMoreFrequent * double(at_rest) ||
+      double(most->second.size()) < kFrequent * double(all))
+    return ground;
+  // The medians of the square and those around it, which the mode may lie close to.
+  for (int axis = 0; axis < 2; ++axis) {
+    std::vector<double> values;
+    for (long x = -1; x <= 1; ++x)
+      for (long y = -1; y <= 1; ++y) {
+        const auto found = squares.find({most->first.first + x, most->first.second + y});
+        if (found == squares.end()) continue;
+        for (const Eigen::Vector2d& velocity : found->second) values.push_back(velocity[axis]);
+      }
+    ground[axis] = quantile(values, 0.5);
+  }
+  return ground;
+}
+
+std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen::VectorXd& time,
+                             bool exact, const DetectionSettings& settings) {
+  std::vector<Rests> all(points.size());
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const PointTrack& point = points[k];
+    const Eigen::VectorXd speed = findSpeeds(point, settings.horizontal_part);
+    std::vector<double> moving;
+    for (Index frame = 0; frame < time.size(); ++frame)
+      if (point.velocity.col(frame).norm() > settings.moving_speed) moving.push_back(speed[frame]);
+    const double fast = moving.empty() ? 0. : quantile(moving, kFast);
+    const double slow = std::clamp(
+        settings.rest_speed_part * fast,
+        exact ? settings.exact_rest_speed_least : settings.rest_speed_least,
+        exact ? settings.exact_rest_speed_greatest : settings.rest_speed_greatest);
+    std::vector<Rest>& rests = all[k].list;
+    rests = findRuns(point, speed, time, slow, settings.rest_duration);
+    mergeRests(point, speed, slow, settings.same_rest, rests);
+    all[k].owner = findOwners(rests, speed);
+  }
+
+  if (!std::isnan(settings.ground_height)) {
+    for (Rests& rests : all)
+      for (Rest& rest : rests.list) {
+        rest.height = settings.ground_height;
+        rest.on_ground = true;
+      }
+    return all;
+  }
+  double lowest = std::numeric_limits<double>::infinity();
+  std::vector<double> levels;
+  for (std::size_t k = 0; k < points.size(); ++k)
+    for (std::size_t i = 0; i < all[k].list.size(); ++i) {
+      Rest& rest = all[k].list[i];
+      lowest = std::min(lowest, rest.height);
+      for (const int direction : {-1, 1})
+        if (rise(points[k], all[k].list, i, direction, settings.same_rest) >=
+            settings.landing_height)
+          rest.on_ground = true;
+      if (rest.on_ground) levels.push_back(rest.height);
+    }
+  levels.push_back(lowest);
+  std::sort(levels.begin(), levels.end());
+  const double same = exact ? settings.exact_same_ground : settings.same_ground;
+  for (Rests& rests : all)
+    for (Rest& rest : rests.list) {
+      const auto level = std::lower_bound(levels.begin(), levels.end(), rest.height - same);
+      if (level != levels.end() && *level <= rest.height + same) rest.on_ground = true;
+    }
+  return all;
+}
+
+CostScales findScales(const std::vector<PointTrack>& points, const std::vector<Rests>& rests,
+                      const Eigen::VectorXd& time, const DetectionSettings& settings) {
+  const Index frames = time.size();
+  Eigen::Array<bool, Eigen::Dynamic, 1> moves = Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, false);
+  for (const PointTrack& point : points)
+    moves = moves || point.velocity.colwise().norm().transpose().array() > settings.moving_speed;
+  Eigen::Array<bool, Eigen::Dynamic, 1> counts = Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, !moves.any());
+  double last = -std::numeric_limits<double>::infinity();
+  for (Index frame = 0; frame < frames; ++frame) {
+    if (moves[frame]) last = time[frame];
+    if (time[frame] - last <= kNearMovement) counts[frame] = true;
+  }
+  last = std::numeric_limits<double>::infinity();
+  for (Index frame = frames; frame-- > 0;) {
+    if (moves[frame]) last = time[frame];
+    if (last - time[frame] <= kNearMovement) counts[frame] = true;
+  }
+
+  std::vector<double> scatter, speeds;
+  for (std::size_t k = 0; k < points.size(); ++k)
+    for (const Rest& rest : rests[k].list) {
+      if (!rest.on_ground) continue;
+      for (Index frame = rest.first; frame < rest.behind; ++frame) {
+        if (!counts[frame]) continue;
+        scatter.push_back(std::abs(points[k].position(2, frame) - rest.height));
+        speeds.push_back(points[k].velocity.col(frame).norm());
+      }
+    }
+  const auto scale = [](std::vector<double>& values, double part, double least, double greatest) {
+    return values.empty() ? greatest : std::clamp(part * quantile(values, 0.5), least, greatest);
+  };
+  CostScales scales;
+  scales.height = scale(scatter, kDeviation, settings.height_scale_least, settings.height_scale_greatest);
+  scales.speed = scale(speeds, settings.speed_scale_part, settings.speed_scale_least, settings.speed_scale_greatest);
+  scales.force = std::clamp(settings.force_scale_part * scales.speed, settings.force_scale_least,
+                            settings.force_scale_greatest);
+  scales.torque = settings.lever * scales.force;
+  return scales;
+}
+
+}  // namespace dynacom::internal
