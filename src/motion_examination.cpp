@@ -70,7 +70,8 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   };
   const auto judge = [&](const Motion& moved, const std::vector<ContactMotion>& contacts,
                          const MotionAnalysis& analysis) {
-    return internal::judgeMotion(desks, moved, recorded, contacts, found.ground, analysis,
+    return internal::judgeMotion(robot, moved, recorded, contacts,
+                                 found.ground.replicate(1, moved.frames()), analysis, {},
                                  settings.verdict, workers);
   };
   found.analysis = analyze(motion);
