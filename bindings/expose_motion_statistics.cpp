@@ -55,6 +55,8 @@ void exposeMotionStatistics() {
       .def_readonly("largest_vertical_force", &ContactStatistics::largest_vertical_force, "[m g]")
       .def_readonly("largest_friction_usage", &ContactStatistics::largest_friction_usage,
                     "1 on the friction pyramid")
+      .def_readonly("largest_cone_usage", &ContactStatistics::largest_cone_usage,
+                    "1 on the friction cone, see computeConeUsage")
       .def_readonly("least_cop_margin", &ContactStatistics::least_cop_margin,
                     "Distance of its centre of pressure to the nearest edge [m]")
       .def(PrintVisitor<ContactStatistics>(&writeContact))
@@ -78,8 +80,9 @@ void exposeMotionStatistics() {
       .def_readonly("residual_torque_rms", &Statistics::residual_torque_rms,
                     "And of its moment about the centre of mass [m g m]")
       .add_property("mean_residual", getter(&Statistics::mean_residual),
-                    "Force [N] and moment [N m] over the frames in which no contact is missing, "
-                    "(6,):\nforward, left and up, as the free-flyer's heading has it")
+                    "Force [N] and moment [N m] over the frames in which a contact is active and\n"
+                    "accelerations are known, (6,): forward, left and up, as the free-flyer's\n"
+                    "heading has it")
       .add_property("contacts", &getContacts, "A ContactStatistics for each contact")
       .def("share", &Statistics::share, (bp::arg("self"), bp::arg("status")),
            "Which part of the frames has a DistributionStatus.")
@@ -103,6 +106,10 @@ void exposeMotionStatistics() {
           (bp::arg("robot"), bp::arg("motion"), bp::arg("analysis"), bp::arg("verdict")),
           "The MotionStatistics of what analyzeMotion and judgeMotion found. Raises ValueError if\n"
           "sizes differ.");
+  bp::def("computeConeUsage", &computeConeUsage, bp::arg("contact"),
+          "How much of its friction cone a contact, a MotionAnalysis.Contact, uses in each frame,\n"
+          "(T,): |(f_x, f_y)| over mu f_z, 1 on the cone. The friction pyramid around it allows\n"
+          "sqrt(2) on its diagonals. NaN, infinite and zero where friction_usage is.");
   bp::def("compareMeasured", &compare, (bp::arg("computed"), bp::arg("measured")),
           "The MeasuredDifference of forces (T, n). Raises ValueError if sizes differ.");
 }

@@ -156,9 +156,9 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
                          const MotionAnalysis& analysis) {
     Eigen::Array<bool, Eigen::Dynamic, 1> unsure = derived.unsure;
     addSmeared(schedule, derived.motion.time, derived.cutoff, unsure);
-    return internal::judgeMotion(part_desks, derived.motion, recorded, motions,
-                                 found.inference.ground, analysis, settings.verdict, workers,
-                                 unsure);
+    return internal::judgeMotion(parts.robot, derived.motion, recorded, motions,
+                                 found.inference.ground, analysis, unsure, settings.verdict,
+                                 workers);
   };
   const MotionAnalysis analysis = analyze(motion, schedule, ground_height);
   found.verdict = judge(found.derived, found.part_motions, analysis);

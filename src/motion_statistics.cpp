@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "dynacom/motion_statistics.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "check.hpp"
@@ -39,24 +40,27 @@ ContactStatistics summarize(const MotionAnalysis::Contact& contact, double weigh
       active > 0. ? contact.vertical_force.sum() / (weight * active) : kNaN;
   statistics.largest_vertical_force = contact.vertical_force.maxCoeff() / weight;
   statistics.largest_friction_usage = largestOf(contact.friction_usage);
+  statistics.largest_cone_usage = largestOf(computeConeUsage(contact));
   statistics.least_cop_margin = -largestOf(-contact.cop_margin);
   return statistics;
 }
 
-// The residual in the heading's axes, averaged over the frames that lack no contact.
+// The residual in the heading's axes, averaged over the frames that have contacts and known
+// accelerations.
 MotionStatistics::Vector6 findMeanResidual(const pinocchio::Model& model, const Motion& motion,
                                            const MotionAnalysis& analysis,
                                            const MotionVerdict& verdict) {
-  const bool flies = internal::hasFreeFlyer(model);
-  const Eigen::VectorXd& missing = verdict[MotionFault::ContactMissing].measured;
-  const Eigen::VectorXd& flight = verdict[MotionFault::FlightWithSupportNeeded].measured;
+  const bool has_heading = internal::hasFreeFlyer(model);
   MotionStatistics::Vector6 sum = MotionStatistics::Vector6::Zero();
   Eigen::Index frames = 0;
   for (Eigen::Index frame = 0; frame < motion.frames(); ++frame) {
-    if (missing[frame] != 0. || flight[frame] != 0.) continue;
+    const bool flies = std::none_of(
+        analysis.contacts.begin(), analysis.contacts.end(),
+        [&](const MotionAnalysis::Contact& contact) { return contact.active[frame]; });
+    if (flies || verdict.unsure[frame]) continue;
     ++frames;
     MotionStatistics::Vector6 residual = analysis.residual.col(frame);
-    if (flies) {
+    if (has_heading) {
       const auto q = motion.q.col(frame).segment<4>(3);
       const Eigen::Rotation2Dd heading(
           std::atan2(2. * (q[3] * q[2] + q[0] * q[1]), 1. - 2. * (q[1] * q[1] + q[2] * q[2])));
@@ -83,6 +87,19 @@ double MotionStatistics::share(DistributionStatus status) const {
   return found == statuses.end() ? 0. : double(found->second) / double(frames);
 }
 
+Eigen::VectorXd computeConeUsage(const MotionAnalysis::Contact& contact) {
+  internal::requireSize("wrench", contact.wrench.cols(), contact.friction_usage.size(),
+                        "frames (as friction_usage)");
+  // Of the pyramid's usage, what the force's tangential part is longer than its larger component.
+  Eigen::VectorXd usage = contact.friction_usage;
+  for (Eigen::Index frame = 0; frame < usage.size(); ++frame) {
+    const auto tangential = contact.wrench.col(frame).head<2>();
+    const double larger = tangential.lpNorm<Eigen::Infinity>();
+    if (larger > 0.) usage[frame] *= tangential.norm() / larger;
+  }
+  return usage;
+}
+
 MotionStatistics summarizeMotion(const DynaCoM& robot, const Motion& motion,
                                  const MotionAnalysis& analysis, const MotionVerdict& verdict) {
   if (!robot.isInitialized())
@@ -94,9 +111,7 @@ MotionStatistics summarizeMotion(const DynaCoM& robot, const Motion& motion,
   for (const Eigen::Index size : {Eigen::Index(analysis.status.size()), analysis.residual.cols(),
                                   analysis.vcom.cols(), analysis.ground_force.cols()})
     internal::requireSize("analysis", size, frames, "frames");
-  for (const MotionFault fault :
-       {MotionFault::ContactMissing, MotionFault::FlightWithSupportNeeded})
-    internal::requireSize("verdict", verdict[fault].measured.size(), frames, "frames");
+  internal::requireSize("verdict", verdict.unsure.size(), frames, "frames");
   if (frames == 0) internal::throwInvalid("motion must have at least one frame, got 0");
 
   const double gravity = -robot.getSettings().gravity.z();

@@ -21,9 +21,11 @@ MotionAnalysis analyzeMotion(Desks& desks, double ground_height, const Motion& m
                              const ContactSchedule& schedule, const AnalysisSettings& settings,
                              Workers& workers);
 
-MotionVerdict judgeMotion(Desks& desks, const Motion& motion, const RecordedMotion& recorded,
-                          const std::vector<ContactMotion>& contacts, const Eigen::VectorXd& ground,
-                          const MotionAnalysis& analysis, const VerdictSettings& settings,
-                          Workers& workers);
+MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
+                          const RecordedMotion& recorded,
+                          const std::vector<ContactMotion>& contacts, const Eigen::MatrixXd& ground,
+                          const MotionAnalysis& analysis,
+                          const Eigen::Array<bool, Eigen::Dynamic, 1>& unsure,
+                          const VerdictSettings& settings, Workers& workers);
 
 }  // namespace dynacom::internal

@@ -5,232 +5,321 @@
 #include <cmath>
 #include <limits>
 #include <ostream>
-#include <pinocchio/algorithm/kinematics.hpp>
+#include <utility>
 
 #include "check.hpp"
-#include "configuration_steps.hpp"
+#include "convex_hull.hpp"
 #include "motion_steps.hpp"
+#include "nan.hpp"
+#include "step_speeds.hpp"
+#include "motion_windows.hpp"
 
 namespace dynacom {
 
+using internal::kNaN;
 using internal::requireField;
+using internal::requireSize;
 using internal::throwInvalid;
 
 namespace {
 
+using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 using Vector6 = DynaCoM::Vector6;
 
 // What forces and moments are compared with, whatever gravity is [m/s²] and [m].
 constexpr double kStandardGravity = 9.81;
 constexpr double kLever = 1.;
+// How many frames at either side of a jump are unsure at least: differences reach that far.
+constexpr Eigen::Index kJumpFrames = 2;
 
-constexpr FaultLimit VerdictSettings::*kLimits[kMotionFaults] = {
-    &VerdictSettings::residual_force,
-    &VerdictSettings::residual_torque,
-    &VerdictSettings::flight_with_support_needed,
-    &VerdictSettings::contact_missing,
-    &VerdictSettings::ground_penetration,
-    &VerdictSettings::foot_sliding,
-    &VerdictSettings::discontinuity,
-    &VerdictSettings::quaternion};
-
-// A wrench by the robot's weight. What is not a number is more than anything.
-struct WrenchSize {
-  WrenchSize(const Vector6& wrench, double weight)
-      : force(finite(wrench.head<3>().norm() / weight)),
-        torque(finite(wrench.tail<3>().norm() / (weight * kLever))) {}
-
-  double larger() const { return std::max(force, torque); }
-  bool isWithin(const VerdictSettings& settings) const {
-    return force <= settings.residual_force.limit && torque <= settings.residual_torque.limit;
-  }
-
-  double force, torque;
-
- private:
-  static double finite(double size) {
-    return std::isnan(size) ? std::numeric_limits<double>::infinity() : size;
-  }
+// What is to be said of a fault, in the order of MotionFault.
+struct Description {
+  const char* code;
+  FaultLimit VerdictSettings::*limit;
+  const char* unit;
+  const char* meaning;
+};
+constexpr Description kDescriptions[kMotionFaults] = {
+    {"residual_force", &VerdictSettings::residual_force, "m g",
+     "the contacts cannot give the force"},
+    {"residual_torque", &VerdictSettings::residual_torque, "m g m",
+     "the contacts cannot give the moment"},
+    {"cop_outside", &VerdictSettings::cop_outside, "m",
+     "the centre of pressure is needed outside what carries"},
+    {"flight_with_support_needed", &VerdictSettings::flight_with_support_needed, "m g",
+     "no contact is active, but the motion needs support"},
+    {"ground_penetration", &VerdictSettings::ground_penetration, "m",
+     "a contact is below the ground"},
+    {"foot_sliding", &VerdictSettings::foot_sliding, "m/s", "an active contact slides"},
+    {"discontinuity", &VerdictSettings::discontinuity, "of the greatest speed",
+     "the motion jumps"},
 };
 
-// How unlike the step to each frame is to those before and after it, and to their mean: the least
-// of the three, so that what is only next to a jump is none. At the ends, where there is one side
-// only, how unlike to what its two neighbours let expect.
-Eigen::VectorXd measureJumps(const pinocchio::Model& model, const Eigen::MatrixXd& q) {
-  const Eigen::Index frames = q.cols(), last = frames - 2;
-  Eigen::VectorXd jumps = Eigen::VectorXd::Zero(frames);
-  if (frames < 4) return jumps;
-  const Eigen::MatrixXd steps = internal::ConfigurationSteps(model).compute(q);
-  const auto distance = [&](Eigen::Index k, const auto& expected) {
-    return (steps.col(k) - expected).template lpNorm<Eigen::Infinity>();
-  };
-  jumps[1] = distance(0, 2. * steps.col(1) - steps.col(2));
-  jumps[frames - 1] = distance(last, 2. * steps.col(last - 1) - steps.col(last - 2));
-  for (Eigen::Index k = 1; k < last; ++k)
-    jumps[k + 1] = std::min({distance(k, steps.col(k - 1)), distance(k, steps.col(k + 1)),
-                             distance(k, 0.5 * (steps.col(k - 1) + steps.col(k + 1)))});
-  return jumps;
+// What else settings have: the name, where it is, and whether it may be 0.
+struct Number {
+  const char* name;
+  double VerdictSettings::*value;
+  bool may_be_zero;
+};
+constexpr Number kNumbers[] = {
+    {"cop_force", &VerdictSettings::cop_force, true},
+    {"linear_speed", &VerdictSettings::linear_speed, false},
+    {"turning_speed", &VerdictSettings::turning_speed, false},
+    {"joint_speed", &VerdictSettings::joint_speed, false},
+    {"jump_time", &VerdictSettings::jump_time, true},
+    {"minimal_window", &VerdictSettings::minimal_window, true},
+    {"interruption", &VerdictSettings::interruption, true},
+};
+
+const Description& describe(MotionFault fault) {
+  return kDescriptions[static_cast<std::size_t>(fault)];
 }
 
-// Distributes with other contacts than the analysis did.
-class SecondLook {
+// What is not a number is more than anything.
+double orInfinity(double size) {
+  return std::isnan(size) ? std::numeric_limits<double>::infinity() : size;
+}
+
+// The height of the ground under contact k in a frame.
+double groundAt(const Eigen::MatrixXd& ground, Eigen::Index k, Eigen::Index frame) {
+  return ground(k, ground.cols() == 1 ? 0 : frame);
+}
+
+// How fast a contact moves along the ground in a frame.
+double slidingSpeed(const ContactMotion& contact, Eigen::Index frame) {
+  return contact.velocity.col(frame).head<2>().norm();
+}
+
+// Measures how far the centre of pressure that is needed lies outside what carries.
+class SupportMeter {
  public:
-  SecondLook(internal::Desks& desks, const std::vector<std::string>& names)
-      : robot_(desks.take()), names_(names) {}
+  SupportMeter(const DynaCoM& robot, const std::vector<ContactMotion>& contacts,
+               const MotionAnalysis& analysis)
+      : contacts_(contacts), analysis_(analysis) {
+    for (const ContactMotion& contact : contacts)
+      corners_.push_back(robot.getContact(contact.name)->getCorners());
+  }
 
-  // Begins a block of frames, which does not depend on others.
-  void begin() { internal::Desks::clear(*robot_); }
-
-  // What is missing with these contacts.
-  Vector6 findResidual(const Motion& motion, const MotionAnalysis& analysis, Eigen::Index frame,
-                       const Eigen::Array<bool, Eigen::Dynamic, 1>& active) {
-    pinocchio::forwardKinematics(robot_->getModel(), robot_->getData(), motion.q.col(frame));
-    for (std::size_t k = 0; k < names_.size(); ++k) {
-      if (active[static_cast<Eigen::Index>(k)])
-        robot_->activateContact(names_[k]);
-      else
-        robot_->deactivateContact(names_[k]);
+  double measure(Eigen::Index frame) {
+    carrying_.clear();
+    double height = 0.;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      if (!analysis_.contacts[k].active[frame]) continue;
+      const Eigen::Quaterniond rotation(Eigen::Vector4d(contacts_[k].rotation.col(frame)));
+      const Eigen::Matrix<double, 3, 2> axes = rotation.toRotationMatrix().leftCols<2>();
+      for (Eigen::Index i = 0; i < corners_[k].cols(); ++i) {
+        const Eigen::Vector3d corner = contacts_[k].position.col(frame) + axes * corners_[k].col(i);
+        carrying_.push_back(corner.head<2>());
+        height += corner.z();
+      }
     }
-    robot_->distributeForce(analysis.ground_force.col(frame), analysis.ground_torque.col(frame),
-                            analysis.com.col(frame));
-    return robot_->getDistribution().residual;
+    height /= double(carrying_.size());
+    const auto force = analysis_.ground_force.col(frame);
+    const auto torque = analysis_.ground_torque.col(frame);
+    const auto com = analysis_.com.col(frame);
+    const Eigen::Vector2d cop = com.head<2>() + (Eigen::Vector2d(-torque.y(), torque.x()) -
+                                                 force.head<2>() * (com.z() - height)) /
+                                                    force.z();
+    return cop.allFinite() ? orInfinity(internal::distanceToHull(cop, carrying_))
+                           : std::numeric_limits<double>::infinity();
   }
 
  private:
-  const std::shared_ptr<DynaCoM> robot_;
-  const std::vector<std::string>& names_;  // in the order of results
+  const std::vector<ContactMotion>& contacts_;
+  const MotionAnalysis& analysis_;
+  std::vector<Eigen::Matrix2Xd> corners_;    // of each contact, in its surface
+  std::vector<Eigen::Vector2d> carrying_;  // of active contacts in a frame, in the world
 };
 
-MotionFinding sumUp(Eigen::VectorXd measured, const FaultLimit& limit,
-                    const Eigen::VectorXd& time) {
+// Marks the frames near steps that are faster than they may be.
+void markAroundJumps(const Eigen::VectorXd& time, const Eigen::ArrayXd& speed,
+                     const VerdictSettings& settings, Mask& unsure) {
+  const Eigen::Index frames = time.size();
+  for (Eigen::Index step = 0; step < speed.size(); ++step) {
+    if (!(speed[step] > settings.discontinuity.limit)) continue;
+    Eigen::Index first = std::max<Eigen::Index>(step - kJumpFrames, 0);
+    Eigen::Index last = std::min(step + 1 + kJumpFrames, frames - 1);
+    while (first > 0 && time[step] - time[first - 1] <= settings.jump_time) --first;
+    while (last < frames - 1 && time[last + 1] - time[step + 1] <= settings.jump_time) ++last;
+    unsure.segment(first, last - first + 1).setConstant(true);
+  }
+}
+
+// @param nameSubject  gives the finding's subject for the frame of the worst
+template <class Function>
+MotionFinding sumUp(Eigen::VectorXd measured, const FaultLimit& limit, const Eigen::VectorXd& time,
+                    Function nameSubject) {
   Eigen::Index frame = 0;
   const double worst = measured.maxCoeff(&frame);
   const Eigen::Index beyond = (measured.array() > limit.limit).count();
   const bool holds = double(beyond) > limit.allowed_share * double(time.size());
-  return {std::move(measured), beyond, worst, time[frame], holds};
+  std::string subject = worst > 0. ? nameSubject(frame) : "";
+  return {std::move(measured), beyond, worst, time[frame], holds, std::move(subject)};
+}
+
+ContactNormal findNormal(const ContactMotion& contact, const Mask& active) {
+  double up = 0., downward = 0.;
+  for (Eigen::Index frame = 0; frame < active.size(); ++frame) {
+    if (!active[frame]) continue;
+    const auto rotation = contact.rotation.col(frame);
+    const double z = 1. - 2. * (rotation[0] * rotation[0] + rotation[1] * rotation[1]);
+    up += z;
+    if (z < 0.) ++downward;
+  }
+  const auto count = double(active.count());
+  return count > 0. ? ContactNormal{up / count, downward / count} : ContactNormal{kNaN, kNaN};
+}
+
+bool isRecorded(const Motion& motion, const RecordedMotion& recorded) {
+  const auto isSame = [](const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
+    return one.rows() == other.rows() && one.cols() == other.cols() && one == other;
+  };
+  return isSame(motion.v, recorded.v) && isSame(motion.a, recorded.a);
+}
+
+void requireFitting(const DynaCoM& robot, const Motion& motion, const RecordedMotion& recorded,
+                    const std::vector<ContactMotion>& contacts, const Eigen::MatrixXd& ground,
+                    const MotionAnalysis& analysis, const Mask& unsure) {
+  const Eigen::Index frames = motion.frames();
+  const auto count = static_cast<Eigen::Index>(contacts.size());
+  requireSize("recorded.q", recorded.q.cols(), frames, "frames");
+  requireSize("recorded.q", recorded.q.rows(), Eigen::Index(robot.getModel().nq),
+              "components (nq)");
+  for (const Eigen::Matrix3Xd* values :
+       {&analysis.ground_force, &analysis.ground_torque, &analysis.com})
+    requireSize("analysis", values->cols(), frames, "frames");
+  requireSize("analysis", analysis.residual.cols(), frames, "frames");
+  requireSize("analysis", Eigen::Index(analysis.status.size()), frames, "frames");
+  requireSize("ground", ground.rows(), count, "heights (one per contact)");
+  if (ground.cols() != 1) requireSize("ground", ground.cols(), frames, "frames (or 1)");
+  if (unsure.size() != 0) requireSize("unsure", unsure.size(), frames, "frames (or none)");
+  const std::vector<std::string> names = robot.getKnownContacts();
+  requireSize("contacts", contacts.size(), names.size(), "contacts of the robot");
+  requireSize("analysis.contacts", analysis.contacts.size(), names.size(),
+              "contacts of the robot");
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (contacts[k].name != names[k] || analysis.contacts[k].name != names[k])
+      throwInvalid("contacts must be those of the robot in its order: expected '", names[k],
+                   "', got '", contacts[k].name, "' and '", analysis.contacts[k].name, "'");
+    for (const Eigen::Index size :
+         {contacts[k].height.size(), contacts[k].position.cols(), contacts[k].rotation.cols(),
+          contacts[k].velocity.cols()})
+      requireSize("contacts", size, frames, "frames");
+    requireSize("analysis.contacts", analysis.contacts[k].active.size(), frames, "frames");
+  }
 }
 
 }  // namespace
 
-const char* to_string(MotionFault fault) {
-  switch (fault) {
-    case MotionFault::ResidualForce:
-      return "residual_force";
-    case MotionFault::ResidualTorque:
-      return "residual_torque";
-    case MotionFault::FlightWithSupportNeeded:
-      return "flight_with_support_needed";
-    case MotionFault::ContactMissing:
-      return "contact_missing";
-    case MotionFault::GroundPenetration:
-      return "ground_penetration";
-    case MotionFault::FootSliding:
-      return "foot_sliding";
-    case MotionFault::Discontinuity:
-      return "discontinuity";
-    case MotionFault::Quaternion:
-      return "quaternion";
+const char* to_string(MotionFault fault) { return describe(fault).code; }
+
+const char* getUnit(MotionFault fault) { return describe(fault).unit; }
+
+const char* getMeaning(MotionFault fault) { return describe(fault).meaning; }
+
+const char* to_string(MotionOutcome outcome) {
+  switch (outcome) {
+    case MotionOutcome::Feasible:
+      return "feasible";
+    case MotionOutcome::NotFeasible:
+      return "not feasible";
+    case MotionOutcome::Unknown:
+      return "unknown";
   }
-  return "unknown fault";
+  return "unknown outcome";
 }
 
 const FaultLimit& VerdictSettings::operator[](MotionFault fault) const {
-  return this->*kLimits[static_cast<std::size_t>(fault)];
+  return this->*describe(fault).limit;
 }
 
-FaultLimit& VerdictSettings::operator[](MotionFault fault) {
-  return this->*kLimits[static_cast<std::size_t>(fault)];
-}
+FaultLimit& VerdictSettings::operator[](MotionFault fault) { return this->*describe(fault).limit; }
 
 void VerdictSettings::validate() const {
-  for (std::size_t k = 0; k < kMotionFaults; ++k) {
-    const FaultLimit& limit = this->*kLimits[k];
-    const std::string field =
-        std::string("VerdictSettings.") + dynacom::to_string(static_cast<MotionFault>(k));
+  for (const Description& description : kDescriptions) {
+    const FaultLimit& limit = this->*description.limit;
+    const std::string field = std::string("VerdictSettings.") + description.code;
     requireField(std::isfinite(limit.limit) && limit.limit >= 0., (field + ".limit").c_str(),
                  "finite and >= 0", limit.limit);
     requireField(limit.allowed_share >= 0. && limit.allowed_share <= 1.,
                  (field + ".allowed_share").c_str(), "from 0 to 1", limit.allowed_share);
   }
-  requireField(std::isfinite(near_ground) && near_ground >= 0., "VerdictSettings.near_ground",
-               "finite and >= 0 m", near_ground);
+  for (const Number& number : kNumbers) {
+    const double value = this->*number.value;
+    requireField(std::isfinite(value) && (value > 0. || (number.may_be_zero && value == 0.)),
+                 (std::string("VerdictSettings.") + number.name).c_str(),
+                 number.may_be_zero ? "finite and >= 0" : "finite and > 0", value);
+  }
 }
 
 std::string VerdictSettings::to_string() const { return internal::concat(*this); }
 
 bool VerdictSettings::operator==(const VerdictSettings& other) const {
-  return near_ground == other.near_ground &&
-         std::all_of(std::begin(kLimits), std::end(kLimits),
-                     [&](auto limit) { return this->*limit == other.*limit; });
+  return std::all_of(std::begin(kDescriptions), std::end(kDescriptions),
+                     [&](const Description& description) {
+                       return this->*description.limit == other.*description.limit;
+                     }) &&
+         std::all_of(std::begin(kNumbers), std::end(kNumbers), [&](const Number& number) {
+           return this->*number.value == other.*number.value;
+         });
 }
 
 std::ostream& operator<<(std::ostream& out, const VerdictSettings& settings) {
   out << "VerdictSettings(";
-  for (std::size_t k = 0; k < kMotionFaults; ++k) {
-    const FaultLimit& limit = settings.*kLimits[k];
-    out << to_string(static_cast<MotionFault>(k)) << "=(" << limit.limit << ", "
-        << limit.allowed_share << "), ";
+  for (const Description& description : kDescriptions) {
+    const FaultLimit& limit = settings.*description.limit;
+    out << description.code << "=(" << limit.limit << ", " << limit.allowed_share << "), ";
   }
-  return out << "near_ground=" << settings.near_ground << ")";
+  const char* separator = "";
+  for (const Number& number : kNumbers) {
+    out << separator << number.name << "=" << settings.*number.value;
+    separator = ", ";
+  }
+  return out << ")";
 }
 
 const MotionFinding& MotionVerdict::operator[](MotionFault fault) const {
   return findings[static_cast<std::size_t>(fault)];
 }
 
-bool MotionVerdict::isFeasible() const {
-  return std::none_of(findings.begin(), findings.end(),
-                      [](const MotionFinding& finding) { return finding.holds; });
+std::vector<std::string> MotionVerdict::getCodes() const {
+  if (outcome == MotionOutcome::Unknown) return {"too_short"};
+  std::vector<std::string> codes;
+  for (std::size_t k = 0; k < kMotionFaults; ++k)
+    if (findings[k].holds) codes.emplace_back(kDescriptions[k].code);
+  if (codes.empty()) codes.emplace_back("feasible");
+  return codes;
 }
 
 MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
                           const RecordedMotion& recorded,
-                          const std::vector<ContactMotion>& contacts, const Eigen::VectorXd& ground,
+                          const std::vector<ContactMotion>& contacts, const Eigen::MatrixXd& ground,
                           const MotionAnalysis& analysis, const VerdictSettings& settings,
-                          int threads) {
+                          int threads, const Mask& unsure) {
   requireField(threads >= 0, "threads", ">= 0", threads);
-  internal::Desks desks(robot);
   internal::Workers workers(threads);
-  return internal::judgeMotion(desks, motion, recorded, contacts, ground, analysis, settings,
-                               workers);
+  return internal::judgeMotion(robot, motion, recorded, contacts, ground, analysis, unsure,
+                               settings, workers);
 }
 
-MotionVerdict internal::judgeMotion(Desks& desks, const Motion& motion,
+MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
                                     const RecordedMotion& recorded,
                                     const std::vector<ContactMotion>& contacts,
-                                    const Eigen::VectorXd& ground, const MotionAnalysis& analysis,
-                                    const VerdictSettings& settings, Workers& workers) {
-  const DynaCoM& robot = desks.robot();
+                                    const Eigen::MatrixXd& ground, const MotionAnalysis& analysis,
+                                    const Mask& unsure, const VerdictSettings& settings,
+                                    Workers& workers) {
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by judgeMotion before initialize()");
   settings.validate();
   motion.validate(robot.getModel());
+  requireFitting(robot, motion, recorded, contacts, ground, analysis, unsure);
   const Eigen::Index frames = motion.frames();
-  const auto count = static_cast<Eigen::Index>(contacts.size());
-  internal::requireSize("recorded.q", recorded.q.cols(), frames, "frames");
-  internal::requireSize("recorded.q", recorded.q.rows(), Eigen::Index(robot.getModel().nq),
-                        "components (nq)");
-  if (recorded.quaternion_error.size() != 0)
-    internal::requireSize("recorded.quaternion_error", recorded.quaternion_error.size(), frames,
-                          "frames");
-  for (const Eigen::Matrix3Xd* values :
-       {&analysis.ground_force, &analysis.ground_torque, &analysis.com})
-    internal::requireSize("analysis", values->cols(), frames, "frames");
-  internal::requireSize("analysis", analysis.residual.cols(), frames, "frames");
-  internal::requireSize("ground", ground.size(), count, "heights (one per contact)");
-  const std::vector<std::string> names = robot.getKnownContacts();
-  internal::requireSize("contacts", contacts.size(), names.size(), "contacts of the robot");
-  internal::requireSize("analysis.contacts", analysis.contacts.size(), names.size(),
-                        "contacts of the robot");
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    if (contacts[k].name != names[k] || analysis.contacts[k].name != names[k])
-      throwInvalid("contacts must be those of the robot in its order: expected '", names[k],
-                   "', got '", contacts[k].name, "' and '", analysis.contacts[k].name, "'");
-    for (const Eigen::Index size : {contacts[k].height.size(), contacts[k].velocity.cols()})
-      internal::requireSize("contacts", size, frames, "frames");
-    internal::requireSize("analysis.contacts", analysis.contacts[k].active.size(), frames,
-                          "frames");
-  }
+
+  MotionVerdict verdict = {};
+  verdict.unsure = unsure.size() != 0 ? unsure : Mask::Constant(frames, false);
+  const StepSpeeds steps =
+      measureStepSpeeds(robot.getModel(), motion.time, recorded.q, settings);
+  markAroundJumps(motion.time, steps.speed, settings, verdict.unsure);
 
   const double weight = robot.getMass() * kStandardGravity;
   std::array<Eigen::VectorXd, kMotionFaults> measured;
@@ -238,58 +327,89 @@ MotionVerdict internal::judgeMotion(Desks& desks, const Motion& motion,
   const auto measure = [&](MotionFault fault) -> Eigen::VectorXd& {
     return measured[static_cast<std::size_t>(fault)];
   };
-  const auto judgeFrame = [&](Eigen::Index frame, const auto& lookAgain) {
-    Eigen::Array<bool, Eigen::Dynamic, 1> active(count), near(count);
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const ContactMotion& contact = contacts[static_cast<std::size_t>(k)];
-      const double height = contact.height[frame] - ground[k];
-      active[k] = analysis.contacts[static_cast<std::size_t>(k)].active[frame];
-      near[k] = active[k] || height <= settings.near_ground;
-      double& depth = measure(MotionFault::GroundPenetration)[frame];
-      depth = std::max(depth, -height);
-      double& sliding = measure(MotionFault::FootSliding)[frame];
-      if (active[k]) sliding = std::max(sliding, contact.velocity.col(frame).head<2>().norm());
+  // What the motion needs and its contacts cannot give.
+  const auto judgeForces = [&](Eigen::Index frame, bool flies, SupportMeter& support) {
+    const auto residual = analysis.residual.col(frame);
+    const double force = orInfinity(residual.head<3>().norm() / weight);
+    const double torque = orInfinity(residual.tail<3>().norm() / (weight * kLever));
+    if (flies) {
+      measure(MotionFault::FlightWithSupportNeeded)[frame] = std::max(force, torque);
+      return;
     }
-
-    const WrenchSize residual(analysis.residual.col(frame), weight);
-    const bool flight = !active.any();
-    const bool unsupported =
-        flight && residual.larger() > settings.flight_with_support_needed.limit;
-    const bool out_of_reach = flight ? unsupported : !residual.isWithin(settings);
-    const bool contact_missing =
-        out_of_reach && residual.larger() > settings.contact_missing.limit &&
-        (near != active).any() && WrenchSize(lookAgain(frame, near), weight).isWithin(settings);
-    if (contact_missing) {
-      measure(MotionFault::ContactMissing)[frame] = residual.larger();
-    } else if (flight) {
-      measure(MotionFault::FlightWithSupportNeeded)[frame] = residual.larger();
-    } else {
-      measure(MotionFault::ResidualForce)[frame] = residual.force;
-      measure(MotionFault::ResidualTorque)[frame] = residual.torque;
-    }
+    measure(MotionFault::ResidualForce)[frame] = force;
+    measure(MotionFault::ResidualTorque)[frame] = torque;
+    const bool is_loaded = !(analysis.ground_force(2, frame) < settings.cop_force * weight);
+    if (is_loaded && analysis.status[static_cast<std::size_t>(frame)] != DistributionStatus::Solved)
+      measure(MotionFault::CoPOutside)[frame] = support.measure(frame);
+  };
+  // How far a contact is below its ground; not a number where that is not known.
+  const auto findDepth = [&](Eigen::Index k, Eigen::Index frame) {
+    return groundAt(ground, k, frame) - contacts[static_cast<std::size_t>(k)].height[frame];
   };
   forEachBlock(workers, frames, [&]() -> BlockWork {
-    return [&, second_look = std::shared_ptr<SecondLook>()](Eigen::Index first,
-                                                            Eigen::Index size) mutable {
-      if (second_look) second_look->begin();
-      const auto lookAgain = [&](Eigen::Index frame, const auto& active) {
-        if (!second_look) {
-          second_look = std::make_shared<SecondLook>(desks, names);
-          second_look->begin();
+    return [&, support = SupportMeter(robot, contacts, analysis)](Eigen::Index first,
+                                                                  Eigen::Index size) mutable {
+      for (Eigen::Index frame = first; frame < first + size; ++frame) {
+        double& depth = measure(MotionFault::GroundPenetration)[frame];
+        double& sliding = measure(MotionFault::FootSliding)[frame];
+        bool flies = true;
+        for (std::size_t k = 0; k < contacts.size(); ++k) {
+          depth = std::fmax(depth, findDepth(Eigen::Index(k), frame));
+          if (!analysis.contacts[k].active[frame]) continue;
+          flies = false;
+          sliding = std::max(sliding, slidingSpeed(contacts[k], frame));
         }
-        return second_look->findResidual(motion, analysis, frame, active);
-      };
-      for (Eigen::Index frame = first; frame < first + size; ++frame) judgeFrame(frame, lookAgain);
+        if (!verdict.unsure[frame]) judgeForces(frame, flies, support);
+      }
     };
   });
-  measure(MotionFault::Discontinuity) = measureJumps(robot.getModel(), recorded.q);
-  if (recorded.quaternion_error.size() != 0)
-    measure(MotionFault::Quaternion) = recorded.quaternion_error;
+  Eigen::VectorXd& jumps = measure(MotionFault::Discontinuity);
+  for (Eigen::Index step = 0; step < steps.speed.size(); ++step)
+    for (const Eigen::Index frame : {step, step + 1})
+      jumps[frame] = std::max(jumps[frame], steps.speed[step]);
 
-  MotionVerdict verdict;
-  for (std::size_t k = 0; k < kMotionFaults; ++k)
+  // The first contact of which a frame's value is.
+  const auto nameContact = [&](auto isIt) -> std::string {
+    for (std::size_t k = 0; k < contacts.size(); ++k)
+      if (isIt(k)) return contacts[k].name;
+    return "";
+  };
+  for (std::size_t k = 0; k < kMotionFaults; ++k) {
+    const auto fault = static_cast<MotionFault>(k);
     verdict.findings[k] =
-        sumUp(std::move(measured[k]), settings[static_cast<MotionFault>(k)], motion.time);
+        sumUp(measured[k], settings[fault], motion.time, [&](Eigen::Index frame) -> std::string {
+          const double worst = measured[k][frame];
+          if (fault == MotionFault::Discontinuity) return steps.fastest;
+          if (fault == MotionFault::GroundPenetration)
+            return nameContact([&](std::size_t i) { return findDepth(Eigen::Index(i), frame) == worst; });
+          if (fault == MotionFault::FootSliding)
+            return nameContact([&](std::size_t i) {
+              return analysis.contacts[i].active[frame] &&
+                     slidingSpeed(contacts[i], frame) == worst;
+            });
+          return "";
+        });
+  }
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    verdict.normals.push_back(findNormal(contacts[k], analysis.contacts[k].active));
+
+  const bool is_too_short = frames < kMinimalFrames && !isRecorded(motion, recorded);
+  const bool any_holds =
+      std::any_of(verdict.findings.begin(), verdict.findings.end(),
+                  [](const MotionFinding& finding) { return finding.holds; });
+  if (is_too_short || (!any_holds && verdict.unsure.all())) {
+    verdict.outcome = MotionOutcome::Unknown;
+    return verdict;
+  }
+  verdict.outcome = any_holds ? MotionOutcome::NotFeasible : MotionOutcome::Feasible;
+  Mask beyond = Mask::Constant(frames, false);
+  for (std::size_t k = 0; k < kMotionFaults; ++k)
+    beyond = beyond || measured[k].array() > settings[static_cast<MotionFault>(k)].limit;
+  const Mask jumped = jumps.array() > settings.discontinuity.limit;
+  verdict.windows = findWindows(motion.time, beyond, jumped, settings);
+  Eigen::Index inside = 0;
+  for (const MotionWindow& window : verdict.windows) inside += window.last - window.first + 1;
+  verdict.feasible_share = double(inside) / double(frames);
   return verdict;
 }
 

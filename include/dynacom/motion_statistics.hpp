@@ -19,6 +19,7 @@ struct ContactStatistics {
   double weight_share_while_active;  ///< the same over the frames where it is active
   double largest_vertical_force;
   double largest_friction_usage;  ///< see DynaCoM::getContactFrictionUsage()
+  double largest_cone_usage;      ///< see computeConeUsage()
   double least_cop_margin;        ///< see DynaCoM::getContactCoPMargin() [m]
 };
 
@@ -37,15 +38,21 @@ struct DYNACOM_EXPORT MotionStatistics {
   double momentum_change;
   /// Root mean squares of the residual's force and moment, about the CoM.
   double residual_force_rms, residual_torque_rms;
-  /// The mean residual, force [N] and moment [N·m], over the frames in which no contact is missing
-  /// (MotionFault::ContactMissing, FlightWithSupportNeeded); zero if there is none. In the axes of
-  /// the free-flyer's heading, forward, left and up, or the world's where there is no free-flyer.
+  /// The mean residual, force [N] and moment [N·m], over the frames in which a contact is active
+  /// and accelerations are known (MotionVerdict::unsure); zero if there is none. In the axes of the
+  /// free-flyer's heading, forward, left and up, or the world's where there is no free-flyer.
   Vector6 mean_residual;
   std::vector<ContactStatistics> contacts;  ///< as MotionAnalysis::contacts
 
   /// Which part of the frames has a status.
   double share(DistributionStatus status) const;
 };
+
+/// How much of its friction cone a contact uses in each frame: ‖(f_x, f_y)‖ over μ f_z, 1 on the
+/// cone. The friction pyramid around it, in which forces lie, allows √2 on its diagonals. NaN,
+/// infinite and zero where friction_usage is.
+/// @return one number per frame
+DYNACOM_EXPORT Eigen::VectorXd computeConeUsage(const MotionAnalysis::Contact& contact);
 
 /// Sums up what was found of a motion.
 /// @param motion    for which both were computed

@@ -5,6 +5,7 @@
 #include <array>
 #include <iosfwd>
 #include <string>
+#include <vector>
 
 #include "dynacom/motion_analysis.hpp"
 #include "dynacom/recorded_motion.hpp"
@@ -12,34 +13,38 @@
 namespace dynacom {
 
 /// What may be wrong with a motion. In each frame something is measured; forces are parts of the
-/// robot's weight m g, moments of m g times a metre.
+/// robot's weight m g, moments of m g times a metre. What accelerations decide, the first four, is
+/// not measured in frames whose accelerations are not known (MotionVerdict::unsure): it is 0 there.
 enum class MotionFault {
-  /// The contacts cannot give the force: ‖force of the residual‖ [m g]. Zero in frames of
-  /// FlightWithSupportNeeded and ContactMissing.
+  /// The contacts cannot give the force: ‖force of the residual‖ [m g]. Zero without contacts.
   ResidualForce,
-  /// The contacts cannot give the moment: ‖moment of the residual‖ [m g·m]. Likewise.
+  /// The contacts cannot give the moment: ‖moment of the residual‖ [m g·m]. Zero without contacts.
   ResidualTorque,
+  /// How far the centre of pressure that is needed lies outside what carries [m]: its horizontal
+  /// distance to the convex hull of all corners of the active contacts. It is (5) of the ground
+  /// wrench, on the horizontal plane through the mean height of these corners. Zero where the
+  /// contacts can give the wrench (Solved), since contacts at different heights have no such plane,
+  /// and where the vertical force is below VerdictSettings::cop_force.
+  CoPOutside,
   /// No contact is active, but something must be given: the larger of ‖f‖ [m g] and ‖τ‖ [m g·m].
   FlightWithSupportNeeded,
-  /// Contacts that are just above the ground, and not active, would give what is out of reach: the
-  /// larger of the residual's force [m g] and moment [m g·m] without them. Where that is within the
-  /// limit, the frame counts as one of the above.
-  ContactMissing,
   /// A contact's lowest corner is below its ground: how deep [m].
   GroundPenetration,
   /// An active contact's lowest corner moves along the ground: how fast [m/s].
   FootSliding,
-  /// A step from frame to frame is unlike those before and after it: by how much, the larger of
-  /// the root's place [m] and what turns [rad].
+  /// A step from frame to frame is none that a motion makes: how fast the root or a joint moves in
+  /// it, as a part of its greatest speed (VerdictSettings). Both frames of a step have its value.
   Discontinuity,
-  /// The root's quaternion, as recorded, had another norm than 1: by how much.
-  Quaternion,
 };
 
-constexpr std::size_t kMotionFaults = 8;
+constexpr std::size_t kMotionFaults = 7;
 
 /// The fault's code, such as "residual_force".
 DYNACOM_EXPORT const char* to_string(MotionFault fault);
+/// The unit of what is measured, such as "m g".
+DYNACOM_EXPORT const char* getUnit(MotionFault fault);
+/// What the fault means, such as "the contacts cannot give the force".
+DYNACOM_EXPORT const char* getMeaning(MotionFault fault);
 
 /// From where on a fault is one.
 struct FaultLimit {
@@ -57,19 +62,34 @@ struct FaultLimit {
 struct DYNACOM_EXPORT VerdictSettings {
   FaultLimit residual_force = {0.1, 0.05};
   FaultLimit residual_torque = {0.03, 0.05};
+  FaultLimit cop_outside = {0.02, 0.05};
   FaultLimit flight_with_support_needed = {0.05, 0.02};
-  FaultLimit contact_missing = {0.03, 0.02};
   FaultLimit ground_penetration = {0.02, 0.02};
   FaultLimit foot_sliding = {0.2, 0.02};
-  FaultLimit discontinuity = {0.15, 0.};
-  FaultLimit quaternion = {1e-3, 0.};
-  /// Up to which height above its ground a contact is just above it, ≥ 0 [m].
-  double near_ground = 0.06;
+  FaultLimit discontinuity = {1., 0.};
+  /// The least vertical force for a centre of pressure to be looked at, ≥ 0 [m g]: below it, that
+  /// point flies far away without a moment that matters.
+  double cop_force = 0.1;
+  /// The greatest speed of the root and of prismatic joints, > 0 [m/s]: nobody runs faster.
+  double linear_speed = 10.;
+  /// The greatest speed at which the root turns, > 0 [rad/s]: a somersault takes 12.
+  double turning_speed = 30.;
+  /// The greatest speed of joints, > 0 [rad/s]: motors of humanoids turn by 20 to 37, and
+  /// retargeted dances reach 40 for a frame.
+  double joint_speed = 50.;
+  /// Frames so close to a jump are unsure, as are two at either side at least, ≥ 0 [s]: filters and
+  /// differences spread a jump over them.
+  double jump_time = 0.1;
+  /// How long a window is at least, ≥ 0 [s].
+  double minimal_window = 1.;
+  /// Interruptions of a window that are shorter than this are none where there is as much time
+  /// without fault before and after them, ≥ 0 [s].
+  double interruption = 0.1;
 
   const FaultLimit& operator[](MotionFault fault) const;
   FaultLimit& operator[](MotionFault fault);
   /// @throws std::invalid_argument naming the first that is out of its range: limits must be finite
-  ///         and ≥ 0, and so must near_ground; shares are from 0 to 1
+  ///         and ≥ 0, shares from 0 to 1, and the others as they say
   void validate() const;
   std::string to_string() const;
   bool operator==(const VerdictSettings& other) const;
@@ -85,30 +105,72 @@ struct MotionFinding {
   double worst;              ///< the largest measured
   double time;               ///< of the first frame where that is [s]
   bool holds;                ///< whether more frames than allowed are beyond the limit
+  /// Whose that is: a contact's name for GroundPenetration and FootSliding; for Discontinuity
+  /// "root", "root's orientation" or a joint's name. Empty for others, and where nothing is.
+  std::string subject;
 };
+
+/// A part of a motion, longer than VerdictSettings::minimal_window, without a frame beyond the
+/// limit of any fault, but for short interruptions. A discontinuity is never one of those.
+struct MotionWindow {
+  Eigen::Index first, last;  ///< frames, both included
+  double begin, end;         ///< their times [s]
+};
+
+/// Where a contact's normal points while the contact is active.
+struct ContactNormal {
+  double up;              ///< mean of its vertical component, 1 for up; NaN if never active
+  double downward_share;  ///< of these frames, where it points down; NaN if there are none
+};
+
+/// What came out.
+enum class MotionOutcome {
+  Feasible,     ///< No fault holds.
+  NotFeasible,  ///< A fault holds.
+  Unknown,      ///< Nothing can be said: there are too few frames whose accelerations are known.
+};
+
+/// "feasible", "not feasible" or "unknown".
+DYNACOM_EXPORT const char* to_string(MotionOutcome outcome);
 
 /// Whether a motion is feasible, and what speaks against it.
 struct DYNACOM_EXPORT MotionVerdict {
+  MotionOutcome outcome;
   std::array<MotionFinding, kMotionFaults> findings;  ///< in the order of MotionFault
+  /// Frames whose accelerations are not known: those that were given, and those near jumps.
+  Eigen::Array<bool, Eigen::Dynamic, 1> unsure;
+  std::vector<MotionWindow> windows;   ///< in their order; none where the outcome is Unknown
+  double feasible_share;               ///< of the frames, that are in windows
+  std::vector<ContactNormal> normals;  ///< of each contact of the robot
 
   const MotionFinding& operator[](MotionFault fault) const;
-  /// Whether no fault holds.
-  bool isFeasible() const;
+  bool isFeasible() const { return outcome == MotionOutcome::Feasible; }
+  /// The codes of the faults that hold; else "feasible"; only "too_short" where that is Unknown.
+  std::vector<std::string> getCodes() const;
 };
 
-/// Judges a motion.
+/// Fewer frames than these tell nothing where derivatives were computed: each of them would be made
+/// of the same few numbers, and a filter has nothing to filter.
+constexpr Eigen::Index kMinimalFrames = 6;
+
+/// Judges a motion. The outcome is Unknown if there are fewer than kMinimalFrames frames and their
+/// derivatives are not those of `recorded`, or if no fault holds but all frames are unsure.
 /// @param contacts  of computeContactMotions() for the same robot and motion
-/// @param ground    height of the ground under each contact, see estimateGround() [m]
-/// @param recorded  the same before any filter, of which q and quaternion_error are looked at
+/// @param recorded  the same before any filter: jumps are looked for in its q, and its v and a say
+///                  whether the motion's are recorded ones
+/// @param ground    height of the ground under each contact, contacts × frames, or contacts × 1
+///                  where it does not change, see estimateGround() [m]; NaN where it is not known
 /// @param analysis  of analyzeMotion() for the same robot and motion
 /// @param threads   as AnalysisSettings::threads
+/// @param unsure    frames whose accelerations are not known; empty if there are none
 /// @throws std::invalid_argument if settings or motion are not valid, or sizes differ;
 ///         NotReadyError before the robot's initialize()
 DYNACOM_EXPORT MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
                                          const RecordedMotion& recorded,
                                          const std::vector<ContactMotion>& contacts,
-                                         const Eigen::VectorXd& ground,
+                                         const Eigen::MatrixXd& ground,
                                          const MotionAnalysis& analysis,
-                                         const VerdictSettings& settings = {}, int threads = 0);
+                                         const VerdictSettings& settings = {}, int threads = 0,
+                                         const Eigen::Array<bool, Eigen::Dynamic, 1>& unsure = {});
 
 }  // namespace dynacom

@@ -11,7 +11,7 @@ A settings file is YAML; what it does not name stays at its default::
       ground_height: null # [m]; null if it is to be estimated
     verdict:              # VerdictSettings: a limit, and the part of the frames that may exceed it
       residual_force: {limit: 0.1, allowed_share: 0.05}
-      near_ground: 0.06
+      minimal_window: 1.0
 """
 
 import math

@@ -15,7 +15,8 @@ from dynacom.motion_report import FAULTS
 # So many of the worst clips, and of those that could not be judged, are told one by one.
 _LISTED = 200
 _COLUMNS = (
-    *("file", "clip", "status", "error", "feasible", "codes", "severity", "frames", "duration"),
+    *("file", "clip", "status", "error", "verdict", "codes", "severity", "feasible_share"),
+    *("frames", "duration"),
     *("mean_vertical_force", "residual_force_rms", "residual_torque_rms"),
     *(f"{code}.{column}" for code in FAULTS for column in ("holds", "frames", "worst")),
 )
@@ -28,12 +29,15 @@ class Overview:
     #: Of clips.
     feasible: int = 0
     not_feasible: int = 0
+    unknown: int = 0
     errors: int = 0
     #: Code -> clips in which the fault holds; all codes.
     codes: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(FAULTS, 0)))
     frames: int = 0
     #: [s]
     duration: float = 0.0
+    #: Of the frames, in windows.
+    feasible_frames: float = 0.0
     #: Rows of the worst clips: those in the largest share of whose frames a fault is that holds.
     worst: list[Row] = field(default_factory=list)
     #: Rows of the first clips that could not be judged.
@@ -42,7 +46,12 @@ class Overview:
     @property
     def clips(self) -> int:
         """All of them."""
-        return self.feasible + self.not_feasible + self.errors
+        return self.judged + self.errors
+
+    @property
+    def judged(self) -> int:
+        """All of them, but for errors."""
+        return self.feasible + self.not_feasible + self.unknown
 
 
 def overview(table: Path, listed: int = _LISTED) -> Overview:
@@ -66,13 +75,16 @@ def _judged(table: Path, found: Overview, listed: int) -> Iterator[Row]:
                 if len(found.failed) < listed:
                     found.failed.append(row)
                 continue
-            found.feasible += row["feasible"]
-            found.not_feasible += not row["feasible"]
+            found.feasible += row["verdict"] == "feasible"
+            found.not_feasible += row["verdict"] == "not feasible"
+            found.unknown += row["verdict"] == "unknown"
+            found.feasible_frames += row["feasible_share"] * row["frames"]
             found.codes.update(code for code in row["codes"] if code in FAULTS)
             found.frames += row["frames"]
             found.duration += row["duration"]
             yield row
 
 
-def _badness(row: Row) -> tuple[bool, float, float]:
-    return not row["feasible"], row["severity"], row["residual_force_rms"]
+def _badness(row: Row) -> tuple[int, float, float]:
+    verdicts = ("feasible", "unknown", "not feasible")
+    return verdicts.index(row["verdict"]), row["severity"], row["residual_force_rms"]

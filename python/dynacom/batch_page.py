@@ -10,7 +10,7 @@ from dynacom.batch_overview import Overview
 from dynacom.batch_row import Job, Row
 from dynacom.batch_store import whole, writing
 from dynacom.dynacom_pywrap import __version__
-from dynacom.motion_report import FAULTS
+from dynacom.motion_report import FAULTS, TOO_SHORT
 
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
@@ -43,8 +43,8 @@ small { opacity: .75; }
 </head>
 <body>
 <h1>$clips clips of $robot</h1>
-<p>$frames frames, $duration of motion. The table of all clips is <code>clips.parquet</code>
-beside this page.</p>
+<p>$frames frames, $duration of motion, $feasible of it in windows without fault. The table of all
+clips is <code>clips.parquet</code> beside this page.</p>
 <h2>Verdicts</h2>
 <table class="bars">$verdicts</table>
 <h2>Reasons</h2>
@@ -92,6 +92,7 @@ def write_index(
     verdicts = (
         ("feasible", found.feasible, "ok"),
         ("not feasible", found.not_feasible, ""),
+        ("unknown: too short", found.unknown, "err"),
         ("error", found.errors, "err"),
     )
     reasons = ((f"{code}: {FAULTS[code][1]}", n, "") for code, n in found.codes.most_common())
@@ -100,6 +101,7 @@ def write_index(
         robot=escape(job.robot.name.encode("utf-8", "backslashreplace").decode()),
         frames=found.frames,
         duration=_duration(found.duration),
+        feasible=f"{found.feasible_frames / max(found.frames, 1):.1%}",
         verdicts=_bars(verdicts, found.clips),
         reasons=_bars(reasons, found.clips),
         worst=_worst(found, links),
@@ -133,7 +135,7 @@ def _title(row: Row) -> str:
 
 
 def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
-    judged = found.feasible + found.not_feasible
+    judged = found.judged
     if not judged:
         return "<p>No clip could be judged.</p>"
     rows = []
@@ -143,9 +145,10 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
             title = f'<a href="{escape(link)}">{title}</a>'
         rows.append(
             f"<tr><td>{title}</td>"
-            f"<td>{'feasible' if row['feasible'] else 'not feasible'}</td>"
+            f"<td>{escape(row['verdict'])}</td>"
             f"<td>{_reasons(row)}</td>"
             + _number(row["severity"], f"{row['severity']:.1%}")
+            + _number(row["feasible_share"], f"{row['feasible_share']:.1%}")
             + _number(row["residual_force_rms"])
             + _number(row["residual_torque_rms"])
             + _number(row["mean_vertical_force"])
@@ -157,6 +160,7 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
         ("Verdict", ""),
         ("Reasons", ""),
         ("Frames at fault", "n"),
+        ("In windows", "n"),
         ("Residual force RMS [m g]", "n"),
         ("Residual moment RMS [m g m]", "n"),
         ("Mean vertical force [m g]", "n"),
@@ -167,6 +171,8 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
 
 
 def _reasons(row: Row) -> str:
+    if row["verdict"] == "unknown":
+        return escape(f"too_short: {TOO_SHORT}")
     texts = [
         f"{code} ({row[f'{code}.frames']} frames, up to {row[f'{code}.worst']:.3g} {unit})"
         for code, (unit, _) in FAULTS.items()

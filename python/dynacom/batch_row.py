@@ -32,9 +32,8 @@ from dynacom.motion_report import (
     FAULTS,
     MotionReport,
     examine,
-    holding_codes,
     make_examiner,
-    verdict_text,
+    window_times,
 )
 from dynacom.robots import Robot
 
@@ -55,6 +54,8 @@ _COLUMNS = (
     ("feasible", "bool", ""),
     ("codes", "list<string>", ""),
     ("severity", "double", ""),
+    ("feasible_share", "double", ""),
+    ("windows", "list<list<double>>", "s"),
     ("frames", "int64", ""),
     ("duration", "double", "s"),
     ("frame_rate", "double", "Hz"),
@@ -81,6 +82,7 @@ _CONTACT_COLUMNS = (
     ("weight_share_while_active", "double", ""),
     ("largest_vertical_force", "double", "m g"),
     ("largest_friction_usage", "double", ""),
+    ("largest_cone_usage", "double", ""),
     ("least_cop_margin", "double", "m"),
     ("ground", "double", "m"),
 )
@@ -161,6 +163,7 @@ class Job:
             "int64": pyarrow.int64(),
             "double": pyarrow.float64(),
             "list<string>": pyarrow.list_(pyarrow.string()),
+            "list<list<double>>": pyarrow.list_(pyarrow.list_(pyarrow.float64())),
         }
         columns = list(_COLUMNS)
         for code, (unit, _) in FAULTS.items():
@@ -314,16 +317,19 @@ def _report_row(report: MotionReport, name: str) -> Row:
     """What the summary says, without its sentences: those take as long as the analysis."""
     found = report.examination
     statistics, derived = found.statistics, found.derived
-    findings = found.verdict.findings
+    verdict = found.verdict
+    findings = verdict.findings
     row = {
         "file": name,
         "robot": printable(report.robot.name),
         "status": "ok",
-        "verdict": verdict_text(found.verdict),
-        "feasible": found.verdict.feasible,
-        "codes": holding_codes(findings),
+        "verdict": verdict.outcome,
+        "feasible": None if verdict.outcome == "unknown" else verdict.feasible,
+        "codes": verdict.codes,
         "severity": max((f.frames for f in findings.values() if f.holds), default=0)
         / statistics.frames,
+        "feasible_share": verdict.feasible_share,
+        "windows": window_times(verdict),
         "duration": float(report.clip.time[-1] - report.clip.time[0]),
         "frame_rate": derived.frame_rate,
         "omega": found.analysis.omega,

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from dynacom.errors import DynacomError
-from dynacom.motion_joints import joint_angles
 from dynacom.robots import Robot
 
 #: |norm - 1| of a quaternion: more than rounding and interpolation do to it.
@@ -29,12 +28,6 @@ TURN = 2.0 * np.pi
 NOTED_EXCESS = 0.1
 #: A time step, in median ones.
 HOLE = 3.0
-#: Of the root and of prismatic joints [m/s]: nobody runs faster.
-LINEAR_SPEED = 10.0
-#: Of the root [rad/s]: a somersault takes 12.
-TURNING_SPEED = 30.0
-#: Of joints [rad/s]. Motors of humanoids turn by 20 to 37; retargeted dances reach 40 for a frame.
-JOINT_SPEED = 50.0
 
 _ORDERS = {"xyzw": "x y z w", "wxyz": "w x y z"}
 
@@ -212,45 +205,3 @@ def check_angles(path: Path, robot: Robot, names: Sequence[str], angles: np.ndar
     return [
         f"The joint {name} ({limits}) goes beyond its limits: {value:.4g} rad in frame {frame}."
     ]
-
-
-def check_jumps(path: Path, robot: Robot, time: np.ndarray, q: np.ndarray) -> None:
-    """Refuses a step from one frame to the next that no motion makes.
-
-    Args:
-        time: (T,), increasing.
-        q: (T, nq), with quaternions of norm 1.
-
-    Raises:
-        DynacomError
-    """
-    if len(time) < 2:
-        return
-    # Two quaternions, whatever their signs, are 2 sin(angle / 4) apart.
-    first, second = q[:-1, 3:7], q[1:, 3:7]
-    sign = np.where(np.einsum("ti,ti->t", first, second) < 0.0, -1.0, 1.0)[:, None]
-    quarter = np.arcsin(np.minimum(0.5 * np.linalg.norm(sign * second - first, axis=1), 1.0))
-    joints = robot.joints
-    angles = np.abs(np.diff(joint_angles(robot, q, joints.names), axis=0))
-    for column in np.flatnonzero(joints.unlimited):
-        angles[:, column] = np.minimum(angles[:, column], 2.0 * np.pi - angles[:, column])
-    moved = np.vstack([np.linalg.norm(np.diff(q[:, :3], axis=0), axis=1), 4.0 * quarter, angles.T])
-    limits = np.append(
-        [LINEAR_SPEED, TURNING_SPEED], np.where(joints.turns, JOINT_SPEED, LINEAR_SPEED)
-    )
-
-    steps = np.diff(time)
-    if (moved / steps <= limits[:, None]).all():
-        return  # as nearly every motion does, which longer steps would not change
-    # Clocks jitter; frames that come early have not moved faster.
-    speed = moved / np.maximum(steps, np.median(steps))
-    excess = speed / limits[:, None]
-    index, frame = np.unravel_index(np.argmax(excess), excess.shape)
-    if excess[index, frame] > 1.0:
-        what = ("the root", "the root's orientation", *joints.names)[index]
-        unit = "rad" if (False, True, *joints.turns)[index] else "m"
-        raise DynacomError(
-            f"{path}: {what} jumps by {moved[index, frame]:.3g} {unit} between frame {frame} "
-            f"({time[frame]:.6g} s) and the next: {speed[index, frame]:.3g} {unit}/s, expected at "
-            f"most {limits[index]:g}"
-        )

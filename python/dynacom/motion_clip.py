@@ -9,7 +9,7 @@ import numpy as np
 
 from dynacom.dynacom_pywrap import ContactPointSettings, ContactSchedule
 from dynacom.errors import DynacomError
-from dynacom.motion_checks import QUATERNION_NOTED, check_angles, check_jumps, normalize
+from dynacom.motion_checks import QUATERNION_NOTED, check_angles, normalize
 from dynacom.motion_joints import brief, configurations, joint_angles
 from dynacom.robots import Robot
 
@@ -99,13 +99,12 @@ def clip_from_configurations(
         option: whether ``--quat`` can change it.
 
     Raises:
-        DynacomError: quaternions of another order or far from norm 1, angles in degrees, a jump.
+        DynacomError: quaternions of another order or far from norm 1, angles in degrees.
     """
     notes = list(notes)
     q = q.copy()
     q[:, 3:7], error = normalize(path, q[:, 3:7], order, option)
     notes += check_angles(path, robot, names, joint_angles(robot, q, names))
-    check_jumps(path, robot, time, q)
     known, there = robot.joints.names, set(names)
     if held := [name for name in known if name not in there]:
         notes.append(

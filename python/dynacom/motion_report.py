@@ -3,7 +3,7 @@
 
 import copy
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -21,10 +21,11 @@ from dynacom.dynacom_pywrap import (
     MotionAnalysis,
     MotionExamination,
     MotionExaminer,
-    MotionFinding,
     MotionVerdict,
     RecordedMotion,
     compareMeasured,
+    computeConeUsage,
+    describeFaults,
 )
 from dynacom.errors import DynacomError
 from dynacom.motion_file import Clip, read_motion
@@ -59,6 +60,7 @@ _FRAME_COLUMNS = (
     ("dcm", _XY, "m"),
     ("nl", _XY, "m"),
     ("status", ("",), ""),
+    ("fault", ("",), ""),
     ("residual", _WRENCH, _WRENCH_UNITS),
     ("feasible_acom", _XYZ, "m/s^2"),
     ("feasible_dam", _XYZ, "N m"),
@@ -69,6 +71,7 @@ _CONTACT_COLUMNS = (
     ("torque", _XYZ, "N m"),
     ("cop", _XY, "m"),
     ("friction_usage", ("",), ""),
+    ("cone_usage", ("",), ""),
     ("yaw_usage", ("",), ""),
     ("cop_margin", ("",), "m"),
     ("position", _XYZ, "m"),
@@ -83,6 +86,7 @@ _CONTACT_STATISTICS = (
     "weight_share_while_active",
     "largest_vertical_force",
     "largest_friction_usage",
+    "largest_cone_usage",
     "least_cop_margin",
 )
 # Where the file says what the contacts felt.
@@ -91,17 +95,13 @@ _MEASURED_COLUMNS = (("measured_force", _XYZ, "N"), ("measured_torque", _XYZ, "N
 # From which height on a ground is worth a question: most files have theirs at zero [m].
 _FAR_FROM_ZERO = 0.1
 
+# From which mean residual on it may be a load that nobody has told of [m g], [m g m].
+_LOAD = 0.01
+
 #: What may be wrong with a motion: code -> unit of its worst value, and what it means.
-FAULTS = {
-    "residual_force": ("m g", "the contacts cannot give the force"),
-    "residual_torque": ("m g m", "the contacts cannot give the moment"),
-    "flight_with_support_needed": ("m g", "no contact is active, but the motion needs support"),
-    "contact_missing": ("m g", "a contact just above the ground would have to push"),
-    "ground_penetration": ("m", "a contact is below the ground"),
-    "foot_sliding": ("m/s", "an active contact slides"),
-    "discontinuity": ("m or rad", "the motion jumps"),
-    "quaternion": ("of the norm", "the root's quaternions are not of norm 1"),
-}
+FAULTS: dict[str, tuple[str, str]] = describeFaults()
+#: What the code ``too_short`` means, for which a motion is unknown.
+TOO_SHORT = "there are too few frames whose accelerations are known"
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ class MotionReport:
     @cached_property
     def arrays(self) -> dict[str, np.ndarray]:
         """By name, see docs/columns.md: ``com`` (T, 3), ``contact.left_sole.force`` (T, 3), ..."""
-        return _collect_arrays(self.clip, self.examination)
+        return _collect_arrays(self.clip, self.examination, self.options)
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -362,6 +362,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
     derived, statistics = found.derived, found.statistics
     derivatives = _derivatives_text(clip, derived)
     notes = [
+        *_downward_texts(robot, found.verdict),
         *clip.notes,
         derivatives,
         report._schedule_text,
@@ -371,7 +372,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
     residual = statistics.mean_residual.tolist()
     unexplained = {"share": 1.0 - solved, "force": residual[:3], "torque": residual[3:]}
     if solved < 1.0:
-        notes.append(_unexplained_text(unexplained))
+        notes.append(_unexplained_text(unexplained, statistics.weight))
     sensitivity = []
     if derived.cutoff > 0.0:
         sensitivity = [_residuals(entry) for entry in found.sensitivity]
@@ -385,9 +386,11 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         "duration": float(clip.time[-1] - clip.time[0]),
         "frame_rate": derived.frame_rate,
         "omega": found.analysis.omega,
-        "verdict": verdict_text(found.verdict),
-        "codes": holding_codes(found.verdict.findings),
+        "verdict": found.verdict.outcome,
+        "codes": found.verdict.codes,
         "reasons": _reasons(found.verdict, report.options, statistics.frames),
+        "feasible_share": found.verdict.feasible_share,
+        "windows": window_times(found.verdict),
         "statuses": {status.name: frames for status, frames in statistics.statuses.items()},
         "residual_force_rms": statistics.residual_force_rms,
         "residual_torque_rms": statistics.residual_torque_rms,
@@ -456,25 +459,35 @@ def _ground_text(robot: Robot, ground: np.ndarray, same_ground: float) -> str:
     return text
 
 
-def _unexplained_text(unexplained: dict[str, Any]) -> str:
-    force, torque = (
-        ", ".join(f"{value:.3g}" for value in unexplained[part]) for part in ("force", "torque")
-    )
-    return (
+def _unexplained_text(unexplained: dict[str, Any], weight: float) -> str:
+    force, torque = unexplained["force"], unexplained["torque"]
+    text = (
         f"In {unexplained['share']:.1%} of the frames the contacts cannot give what the motion "
-        f"takes. Where no contact is missing, ({force}) N and ({torque}) N m are missing on "
-        "average, forward, left and up: a load that nobody has told of may be the reason."
+        "takes."
     )
+    if max(np.linalg.norm(force), np.linalg.norm(torque)) > _LOAD * weight:
+        force, torque = (", ".join(f"{value:.3g}" for value in part) for part in (force, torque))
+        text += (
+            f" Where a contact is active, ({force}) N and ({torque}) N m are missing on average, "
+            "forward, left and up: a load that nobody has told of may be the reason."
+        )
+    return text
 
 
-def verdict_text(verdict: MotionVerdict) -> str:
-    """As results have it."""
-    return "feasible" if verdict.feasible else "not feasible"
+def _downward_texts(robot: Robot, verdict: MotionVerdict) -> Iterator[str]:
+    """Of contacts whose normal points down in most frames in which they are active."""
+    for (name, settings), normal in zip(robot.contacts.items(), verdict.normals, strict=True):
+        if normal.downward_share > 0.5:
+            yield (
+                f"{name}'s normal points down (the z axis of the frame {settings.frame_name} has "
+                f"a vertical component of {normal.up:.2f} on average) while it carries: a "
+                "contact's z axis must point into the robot."
+            )
 
 
-def holding_codes(findings: Mapping[str, MotionFinding]) -> list[str]:
-    """The codes of the faults that hold, or ``feasible``."""
-    return [code for code, finding in findings.items() if finding.holds] or ["feasible"]
+def window_times(verdict: MotionVerdict) -> list[list[float]]:
+    """The first and the last time of each window."""
+    return [[window.begin, window.end] for window in verdict.windows]
 
 
 def _reasons(verdict: MotionVerdict, options: AnalysisOptions, frames: int) -> list[dict[str, Any]]:
@@ -488,6 +501,8 @@ def _reasons(verdict: MotionVerdict, options: AnalysisOptions, frames: int) -> l
                 f": more than {limit.limit:g} {unit} in {finding.frames} of {frames} frames, up to "
                 f"{finding.worst:.3g} {unit} at {finding.time:.2f} s"
             )
+            if finding.subject:
+                text += f" ({finding.subject})"
         reasons.append(
             {
                 "code": code,
@@ -497,6 +512,7 @@ def _reasons(verdict: MotionVerdict, options: AnalysisOptions, frames: int) -> l
                 "worst": finding.worst,
                 "unit": unit,
                 "time": finding.time,
+                "subject": finding.subject or None,
                 "threshold": limit.limit,
                 "allowed_share": limit.allowed_share,
                 "text": text,
@@ -514,7 +530,7 @@ def _residuals(
         "residual_force_rms": statistics.residual_force_rms,
         "residual_torque_rms": statistics.residual_torque_rms,
         "relaxed_share": statistics.share(DistributionStatus.Relaxed),
-        "codes": holding_codes(found.verdict.findings),
+        "codes": found.verdict.codes,
     }
 
 
@@ -536,11 +552,27 @@ def _compare_forces(clip: Clip, analysis: MotionAnalysis) -> dict[str, Any]:
 # The table.
 
 
-def _collect_arrays(clip: Clip, found: MotionExamination) -> dict[str, np.ndarray]:
+def _faults_by_frame(verdict: MotionVerdict, options: AnalysisOptions) -> np.ndarray:
+    """The codes of the faults beyond whose limits each frame is, with + between them, (T,)."""
+    combination = np.zeros(len(verdict.unsure), dtype=int)
+    for bit, (code, finding) in enumerate(verdict.findings.items()):
+        combination |= (finding.measured > getattr(options.verdict, code).limit) << bit
+    found, places = np.unique(combination, return_inverse=True)
+    texts = [
+        "+".join(code for bit, code in enumerate(verdict.findings) if number >> bit & 1)
+        for number in found.tolist()
+    ]
+    return np.array(texts)[places]
+
+
+def _collect_arrays(
+    clip: Clip, found: MotionExamination, options: AnalysisOptions
+) -> dict[str, np.ndarray]:
     analysis = found.analysis
-    names = [name for name, _, _ in _FRAME_COLUMNS if name != "status"]
+    names = [name for name, _, _ in _FRAME_COLUMNS if name not in ("status", "fault")]
     arrays = {name: getattr(analysis, name) for name in names}
     arrays["status"] = np.array([status.name for status in analysis.status])
+    arrays["fault"] = _faults_by_frame(found.verdict, options)
     for contact, moved, height in zip(analysis.contacts, found.contacts, found.ground, strict=True):
         wrench = contact.wrench
         values = {
@@ -549,6 +581,7 @@ def _collect_arrays(clip: Clip, found: MotionExamination) -> dict[str, np.ndarra
             "torque": wrench[:, 3:],
             "cop": contact.cop,
             "friction_usage": contact.friction_usage,
+            "cone_usage": computeConeUsage(contact),
             "yaw_usage": contact.yaw_usage,
             "cop_margin": contact.cop_margin,
             "position": moved.position,

@@ -59,6 +59,20 @@
     ...more.trace,
   });
 
+  // Along the axis of time: the windows without fault.
+  const bands = data.windows.map(([x0, x1]) => ({
+    type: "rect",
+    yref: "paper",
+    x0,
+    x1,
+    y0: 0,
+    y1: 0.04,
+    layer: "below",
+    line: { width: 0 },
+    fillcolor: "rgba(27, 127, 75, 0.45)",
+  }));
+  const overTime = (shapes, more = {}) => layout({ shapes: [...bands, ...shapes], ...more });
+
   function layout(more = {}) {
     return {
       font: FONT,
@@ -94,7 +108,7 @@
         traces.push(line(`${name}, file`, column(`${index}.measured`), color, more));
       }
     });
-    return [traces, layout({ shapes: [level(1, "#9aa5af")] })];
+    return [traces, overTime([level(1, "#9aa5af")])];
   }
 
   function drawFriction() {
@@ -107,7 +121,7 @@
         traces.push(line(`${name}, yaw`, yaw, color, more));
       }
     });
-    return [traces, layout({ shapes: [level(1, "#b3261e")] })];
+    return [traces, overTime([level(1, "#b3261e")])];
   }
 
   function drawResidual(name) {
@@ -116,7 +130,7 @@
     const shapes = limit === undefined ? [] : [level(limit, "#b3261e")];
     return [
       [line("residual", column(name), "#b3261e", more)],
-      layout({ showlegend: false, shapes }),
+      overTime(shapes, { showlegend: false }),
     ];
   }
 
@@ -163,7 +177,8 @@
       range: [rows.length - 0.5, -0.5],
     };
     element("schedule").style.height = `${44 + 24 * rows.length}px`;
-    return [traces, layout({ showlegend: false, hovermode: "closest", barmode: "overlay", yaxis })];
+    const more = { showlegend: false, hovermode: "closest", barmode: "overlay", yaxis };
+    return [traces, overTime([], more)];
   }
 
   const plots = ["forces", "friction", "residual_force", "residual_torque", "schedule"].map(element);

@@ -18,6 +18,7 @@ import numpy as np
 
 from dynacom import scene
 from dynacom.errors import DynacomError
+from dynacom.motion_report import TOO_SHORT
 from dynacom.robots import Robot
 
 
@@ -66,6 +67,7 @@ def write_page(
         ],
         "colors": {name: _css(color) for name, color in scene.COLORS.items()},
         "thresholds": {reason["code"]: reason["threshold"] for reason in summary["reasons"]},
+        "windows": summary["windows"],
         "sceneTimes": [] if recording is None else recording.times.round(6).tolist(),
     }
     page = Template(_read("page.html")).substitute(
@@ -156,7 +158,7 @@ def _columns(
             columns[f"{number}.measured"] = (
                 np.sum(up * arrays[f"{key}.measured_force"], axis=1) / weight
             )
-        columns[f"{number}.friction"] = arrays[f"{key}.friction_usage"]
+        columns[f"{number}.friction"] = arrays[f"{key}.cone_usage"]
         columns[f"{number}.yaw"] = arrays[f"{key}.yaw_usage"]
         corners = scene.surface_corners(settings, arrays, name)
         for corner in range(corners.shape[1]):
@@ -219,14 +221,18 @@ def _head(summary: Mapping[str, Any]) -> str:
 
 
 def _verdict(summary: Mapping[str, Any]) -> str:
-    held = [reason for reason in summary["reasons"] if reason["holds"]]
-    others = [reason for reason in summary["reasons"] if not reason["holds"]]
-    good = summary["verdict"] == "feasible"
     verdict = summary["verdict"]
+    held = [reason for reason in summary["reasons"] if reason["code"] in summary["codes"]]
+    others = [reason for reason in summary["reasons"] if reason not in held]
+    kind = {"feasible": "good", "not feasible": "bad"}.get(verdict, "unknown")
     parts = [
-        f'<section class="verdict {"good" if good else "bad"}">',
+        f'<section class="verdict {kind}">',
         f"<h2>{escape(verdict[:1].upper() + verdict[1:])}</h2>",
     ]
+    if kind == "unknown":
+        parts.append(f"<p><code>too_short</code> {escape(TOO_SHORT)}</p>")
+    else:
+        parts.append(_windows(summary))
     if held:
         parts.append(_reasons(held))
     if others:
@@ -237,6 +243,19 @@ def _verdict(summary: Mapping[str, Any]) -> str:
             "</details>",
         ]
     return "".join([*parts, "</section>"])
+
+
+def _windows(summary: Mapping[str, Any], listed: int = 20) -> str:
+    windows = summary["windows"]
+    if not windows:
+        return '<p class="caption">No window without fault.</p>'
+    texts = [f"{_moment(begin)} to {_moment(end)}" for begin, end in windows[:listed]]
+    if len(windows) > listed:
+        texts.append(f"and {len(windows) - listed} more")
+    return (
+        f'<p class="caption">Windows without fault, {_percent(summary["feasible_share"])} of the '
+        f"frames: {', '.join(texts)}</p>"
+    )
 
 
 def _reasons(reasons: Sequence[Mapping[str, Any]]) -> str:
@@ -279,7 +298,7 @@ def _contacts(robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[s
     rows = []
     for number, name in enumerate(robot.contacts):
         contact = summary["contacts"][name]
-        friction = arrays[f"contact.{name}.friction_usage"]
+        friction = arrays[f"contact.{name}.cone_usage"]
         rows.append(
             (
                 f"{_dot(scene.contact_color(number))} {escape(name)}",

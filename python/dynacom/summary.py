@@ -6,9 +6,15 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 from rich.table import Table
 
+from dynacom.motion_report import TOO_SHORT
+
 if TYPE_CHECKING:
     from dynacom.batch import BatchProgress
     from dynacom.batch_overview import Overview
+
+
+#: Of verdicts, where they are printed.
+VERDICT_COLORS = {"feasible": "green", "not feasible": "red", "unknown": "yellow"}
 
 
 def summary_table(summary: dict[str, Any]) -> Table:
@@ -17,11 +23,15 @@ def summary_table(summary: dict[str, Any]) -> Table:
     table.add_column(style="bold", overflow="fold")
     table.add_column(overflow="fold")
 
-    feasible = summary["verdict"] == "feasible"
-    table.add_row("Verdict", f"[{'green' if feasible else 'red'}]{summary['verdict']}[/]")
+    color = VERDICT_COLORS[summary["verdict"]]
+    table.add_row("Verdict", f"[{color}]{summary['verdict']}[/]")
+    if summary["verdict"] == "unknown":
+        table.add_row("  too_short", TOO_SHORT)
     for reason in summary["reasons"]:
-        if reason["holds"]:
+        if reason["code"] in summary["codes"]:
             table.add_row(f"  {reason['code']}", escape(reason["text"]))
+    if summary["verdict"] != "unknown":
+        table.add_row("Without fault", _windows_text(summary))
     table.add_section()
     rate = summary["frame_rate"]
     at = f" at {rate:.6g} Hz" if rate else ""
@@ -63,6 +73,16 @@ def summary_table(summary: dict[str, Any]) -> Table:
     return table
 
 
+def _windows_text(summary: dict[str, Any], listed: int = 8) -> str:
+    windows = summary["windows"]
+    shortest = summary["options"]["verdict"]["minimal_window"]
+    if not windows:
+        return f"no window of {shortest:g} s or more"
+    texts = [f"{begin:.2f} to {end:.2f} s" for begin, end in windows[:listed]]
+    more = f", and {len(windows) - listed} more" if len(windows) > listed else ""
+    return f"{summary['feasible_share']:.1%} of the frames: {', '.join(texts)}{more}"
+
+
 def overview_table(found: "Overview", state: "BatchProgress") -> Table:
     """What a batch found, and how much of it was new, as a table of two columns."""
     table = Table(show_header=False)
@@ -75,6 +95,8 @@ def overview_table(found: "Overview", state: "BatchProgress") -> Table:
     table.add_row("Clips", str(found.clips))
     table.add_row("  feasible", f"[green]{share(found.feasible)}[/]")
     table.add_row("  not feasible", f"[red]{share(found.not_feasible)}[/]")
+    if found.unknown:
+        table.add_row("  unknown", f"[yellow]{share(found.unknown)}[/]")
     table.add_row("  errors", share(found.errors))
     table.add_section()
     for code, count in found.codes.most_common():

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "dynacom/motion_verdict.hpp"
+
+namespace dynacom::internal {
+
+/// The windows of a motion, see MotionWindow.
+/// @param time    frames, increasing [s]
+/// @param beyond  frames at fault
+/// @param jumps   frames at fault that no window may hold
+std::vector<MotionWindow> findWindows(const Eigen::VectorXd& time,
+                                      const Eigen::Array<bool, Eigen::Dynamic, 1>& beyond,
+                                      const Eigen::Array<bool, Eigen::Dynamic, 1>& jumps,
+                                      const VerdictSettings& settings);
+
+}  // namespace dynacom::internal
