@@ -38,6 +38,12 @@ Motion differentiateRows(const pinocchio::Model& model, const Eigen::VectorXd& t
   return differentiate(model, time, q.transpose());
 }
 
+double estimateNoise(const pinocchio::Model& model, const Eigen::VectorXd& time,
+                     const Eigen::MatrixXd& q, Eigen::Index stride) {
+  const WithoutLock without_lock;
+  return estimateAccelerationNoise(model, time, q.transpose(), stride);
+}
+
 }  // namespace
 
 void exposeMotion() {
@@ -81,7 +87,15 @@ void exposeMotion() {
   bp::def("differentiate", &differentiateRows, (bp::arg("model"), bp::arg("time"), bp::arg("q")),
           "The Motion through configurations (T, nq) at times (T,): velocities and accelerations\n"
           "are those of the parabola through a frame and its two neighbours, in the tangent space\n"
-          "at the frame. Raises ValueError as Motion.validate.");
+          "at the frame; at both ends, those of the polynomial of third order through four.\n"
+          "Raises ValueError as Motion.validate.");
+  bp::def("estimateAccelerationNoise", &estimateNoise,
+          (bp::arg("model"), bp::arg("time"), bp::arg("q"), bp::arg("stride") = 1),
+          "How noisy accelerations of the centre of mass are, if they are computed from every\n"
+          "stride-th of the configurations (T, nq) at times (T,) without a filter: the deviation\n"
+          "of their noise, by differences of sixth order, of which the lower quartile counts [g].\n"
+          "NaN for fewer than seven frames. Raises ValueError as Motion.validate, and for strides\n"
+          "below 1.");
   bp::def("compareDerivatives", &compareDerivatives, (bp::arg("model"), bp::arg("motion")),
           "Compares a motion's derivatives with its differences, as root mean squares. Raises\n"
           "ValueError as Motion.validate.");

@@ -50,6 +50,11 @@ std::string writeDerived(const DerivedMotion& derived) {
                           ", frame_rate=", derived.frame_rate, ", cutoff=", derived.cutoff, ")");
 }
 
+bp::object getUnsure(const DerivedMotion& derived) {
+  const Eigen::Matrix<bool, Eigen::Dynamic, 1> unsure = derived.unsure.matrix();
+  return bp::object(unsure);
+}
+
 DerivedMotion derive(const pinocchio::Model& model, const RecordedMotion& recorded, double cutoff) {
   const WithoutLock without_lock;
   return deriveMotion(model, recorded, cutoff);
@@ -97,22 +102,46 @@ void exposeRecordedMotion() {
       .def_readonly("cutoff", &DerivedMotion::cutoff, "Of the filter; 0 where there was none [Hz]")
       .def_readonly("time_error", &DerivedMotion::time_error,
                     "By how much times were moved to be evenly spaced [s]")
+      .def_readonly("is_automatic", &DerivedMotion::is_automatic,
+                    "Whether the cut-off, or that there is none, was chosen for the noise")
+      .def_readonly("noise", &DerivedMotion::noise,
+                    "estimateAccelerationNoise; NaN where no cut-off had to be chosen [g]")
+      .def_readonly("thinned_noise", &DerivedMotion::thinned_noise,
+                    "The same of about kThinnedRate frames a second, where there are more [g]")
+      .add_property("unsure", &getUnsure,
+                    "Whether a frame's accelerations hang on what was before the first frame or\n"
+                    "after the last one, (T,): it was filtered, is within half a period of the\n"
+                    "cut-off from that end, and moves there by more than kUnsureForce [m g] or\n"
+                    "kUnsureTorque [m g m]")
       .def(PrintVisitor<DerivedMotion>(&writeDerived))
       .def(CopyVisitor<DerivedMotion>());
 
   bp::scope().attr("kVelocityMismatch") = kVelocityMismatch;
   bp::scope().attr("kAccelerationMismatch") = kAccelerationMismatch;
   bp::scope().attr("kEvenTimes") = kEvenTimes;
+  bp::scope().attr("kExactNoise") = kExactNoise;
+  bp::scope().attr("kAutomaticCutoff") = kAutomaticCutoff;
+  bp::scope().attr("kMeasuredCutoff") = kMeasuredCutoff;
+  bp::scope().attr("kMeasuredCutoffPart") = kMeasuredCutoffPart;
+  bp::scope().attr("kThinnedRate") = kThinnedRate;
+  bp::scope().attr("kRoundedCutoff") = kRoundedCutoff;
+  bp::scope().attr("kUnsureForce") = kUnsureForce;
+  bp::scope().attr("kUnsureTorque") = kUnsureTorque;
   bp::def("findFrameRate", &findFrameRate, bp::arg("time"),
           "Frames per second, where times (T,) are evenly spaced, up to kEvenTimes of a step;\n"
           "else NaN [Hz].");
-  bp::def("deriveMotion", &derive, (bp::arg("model"), bp::arg("recorded"), bp::arg("cutoff")),
+  bp::def("deriveMotion", &derive,
+          (bp::arg("model"), bp::arg("recorded"), bp::arg("cutoff") = kAutomaticCutoff),
           "The DerivedMotion of a RecordedMotion: its own velocities and accelerations, if they\n"
           "agree with the configurations up to kVelocityMismatch and kAccelerationMismatch, else\n"
           "those of differentiate after filterConfigurations at the cut-off [Hz], or without a\n"
-          "filter if that is 0. Raises ValueError as Motion.validate, and if frames are to be\n"
+          "filter if that is 0. If it is kAutomaticCutoff, which is NaN, exact motions are not\n"
+          "filtered, those that are so at kThinnedRate only at kRoundedCutoff, and all others at\n"
+          "kMeasuredCutoff, or kMeasuredCutoffPart of the frame rate if that is lower: a motion\n"
+          "is exact up to kExactNoise of its accelerations. Raises ValueError as Motion.validate, and if frames are to be\n"
           "filtered that are not evenly spaced, or with a cut-off that is out of range.");
-  bp::def("rederiveMotion", &rederive, (bp::arg("model"), bp::arg("recorded"), bp::arg("cutoff")),
+  bp::def("rederiveMotion", &rederive,
+          (bp::arg("model"), bp::arg("recorded"), bp::arg("cutoff") = kAutomaticCutoff),
           "As deriveMotion, whatever velocities and accelerations were recorded.");
 }
 

@@ -13,6 +13,8 @@
 
 namespace dynacom {
 
+using internal::requireConfigurations;
+using internal::requireFrames;
 using internal::requireTime;
 using internal::throwInvalid;
 
@@ -20,24 +22,6 @@ namespace {
 
 // What mismatches of derivatives are a part of at least: [m/s, rad/s], [m/s², rad/s²].
 constexpr double kLeastVelocity = 0.05, kLeastAcceleration = 0.5;
-
-void requireFrames(const char* name, const Eigen::MatrixXd& values, Eigen::Index size,
-                   const char* unit, Eigen::Index frames) {
-  internal::requireSize(name, values.rows(), size, unit);
-  internal::requireSize(name, values.cols(), frames, "frames");
-  for (Eigen::Index frame = 0; frame < frames; ++frame)
-    if (!internal::areFinite(values.col(frame)))
-      throwInvalid(name, " must be finite, got another number in frame ", frame);
-}
-
-void requireConfigurations(const pinocchio::Model& model, const Eigen::MatrixXd& q,
-                           Eigen::Index frames) {
-  requireFrames("q", q, model.nq, "components (nq)", frames);
-  const internal::MotionCheck check(model);
-  for (Eigen::Index frame = 0; frame < frames; ++frame)
-    if (!check.isConfiguration(q.col(frame)))
-      throwInvalid("q must have quaternions of norm 1, got another in frame ", frame);
-}
 
 // Components of configurations, by how they move.
 
@@ -182,6 +166,30 @@ struct Section {
   }
 };
 
+// Beyond its ends a motion is continued with a constant acceleration: that of the parabola that fits
+// the frames of so many periods of the cut-off best, and at least so many steps, times a factor.
+// Of the half period and the three quarters, which were tried on sinusoids and walks that were cut
+// anywhere, with and without noise, the first weighs what is known of the acceleration against how
+// old that is, the second against noise.
+constexpr double kEndPeriods = 0.5;
+constexpr Eigen::Index kLeastEndSteps = 4;
+constexpr double kEndFactor = 0.75;
+// After so many periods it is continued without acceleration: none of that is felt inside.
+constexpr double kAcceleratedPeriods = 2.;
+
+// Weights of as many steps, from one frame to the next: their sum is the acceleration of the
+// parabola that fits the frames best, per frame², times kEndFactor.
+Eigen::VectorXd makeEndWeights(Eigen::Index steps) {
+  const Eigen::ArrayXd squares =
+      (Eigen::ArrayXd::LinSpaced(steps + 1, 0., double(steps)) - 0.5 * double(steps)).square();
+  Eigen::ArrayXd weights = squares - squares.mean();  // of the frames, up to a factor
+  weights *= 2. * kEndFactor / (weights * squares).sum();
+  Eigen::VectorXd sums(steps);
+  double sum = 0.;
+  for (Eigen::Index step = steps; step > 0; --step) sums[step - 1] = sum += weights[step];
+  return sums;
+}
+
 // Filters some components, which lie in a space of their own, forward and backward.
 template <class Space>
 void filterComponents(const Space& space, double rate, double cutoff, Eigen::MatrixXd& q) {
@@ -194,19 +202,34 @@ void filterComponents(const Space& space, double rate, double cutoff, Eigen::Mat
   for (Eigen::Index frame = 0; frame < frames; ++frame)
     for (Eigen::Index row = 0; row < rows; ++row)
       padded(row, padding + frame) = q(space.components[static_cast<std::size_t>(row)], frame);
-  // Step by step: what lies further away may have turned by more than a tangent space can tell.
-  Eigen::VectorXd step(space.size()), next(rows);
-  const auto reflect = [&](Eigen::Index from, Eigen::Index to, Eigen::Index at, int direction) {
-    space.difference(padded.col(from), padded.col(to), step);
-    step = -step;
-    space.integrate(padded.col(at), step, next);
-    padded.col(at + direction) = next;
+  const auto inPeriods = [&](double count) {
+    return static_cast<Eigen::Index>(std::ceil(count * rate / cutoff));
   };
-  const Eigen::Index first = padding, last = padding + frames - 1;
-  for (Eigen::Index k = 0; k < padding; ++k) {
-    reflect(first + k, first + k + 1, first - k, -1);
-    reflect(last - k, last - k - 1, last + k, 1);
-  }
+  const Eigen::Index fitted =
+      std::min(std::max(inPeriods(kEndPeriods), kLeastEndSteps), frames - 1);
+  const Eigen::VectorXd weights =
+      fitted < kLeastEndSteps ? Eigen::VectorXd() : makeEndWeights(fitted);
+  // Step by step: what lies further away may have turned by more than a tangent space can tell.
+  // The way out from the end is the way in, reflected, but for what an acceleration, which is the
+  // same on both sides, makes of it.
+  Eigen::VectorXd step(space.size()), next(rows);
+  const auto extend = [&](Eigen::Index end, int outward) {
+    Eigen::VectorXd acceleration = Eigen::VectorXd::Zero(space.size());
+    for (Eigen::Index k = 0; k < weights.size(); ++k) {
+      space.difference(padded.col(end - outward * k), padded.col(end - outward * (k + 1)), step);
+      acceleration += weights[k] * step;
+    }
+    for (Eigen::Index k = 0; k < padding; ++k) {
+      const Eigen::Index inner = end - outward * k, outer = end + outward * k;
+      space.difference(padded.col(inner), padded.col(inner - outward), step);
+      const Eigen::Index accelerated = std::min(k, inPeriods(kAcceleratedPeriods));
+      step = double(2 * accelerated + 1) * acceleration - step;
+      space.integrate(padded.col(outer), step, next);
+      padded.col(outer + outward) = next;
+    }
+  };
+  extend(padding, -1);
+  extend(padding + frames - 1, 1);
   for (int pass = 0; pass < 2; ++pass) {
     for (const int number : {0, 1})
       Section::butterworth(number, cutoff / rate).filter(space, padded);
@@ -272,14 +295,26 @@ Motion differentiate(const pinocchio::Model& model, const Eigen::VectorXd& time,
   for (Eigen::Index frame = 1; frame + 1 < frames; ++frame)
     fit(frame, time[frame - 1] - time[frame], -steps.col(frame - 1), time[frame + 1] - time[frame],
         steps.col(frame));
-  const auto fitEnd = [&](Eigen::Index frame, Eigen::Index one, Eigen::Index other) {
-    Eigen::VectorXd first(model.nv), second(model.nv);
-    pinocchio::difference(model, q.col(frame), q.col(one), first);
-    pinocchio::difference(model, q.col(frame), q.col(other), second);
-    fit(frame, time[one] - time[frame], first, time[other] - time[frame], second);
+  // The polynomial of third order through zero and three differences, or of second through two.
+  const auto fitEnd = [&](Eigen::Index frame, int inward) {
+    const Eigen::Index order = std::min<Eigen::Index>(frames - 1, 3);
+    Eigen::MatrixXd powers(order, order), differences(model.nv, order);
+    Eigen::VectorXd difference(model.nv);
+    for (Eigen::Index k = 0; k < order; ++k) {
+      const Eigen::Index other = frame + inward * (k + 1);
+      pinocchio::difference(model, q.col(frame), q.col(other), difference);
+      differences.col(k) = difference;
+      for (Eigen::Index power = 0; power < order; ++power)
+        powers(power, k) = std::pow(time[other] - time[frame], double(power + 1));
+    }
+    // differences = coefficients powers
+    const Eigen::MatrixXd coefficients =
+        powers.transpose().partialPivLu().solve(differences.transpose()).transpose();
+    motion.v.col(frame) = coefficients.col(0);
+    motion.a.col(frame) = 2. * coefficients.col(1);
   };
-  fitEnd(0, 1, 2);
-  fitEnd(frames - 1, frames - 2, frames - 3);
+  fitEnd(0, 1);
+  fitEnd(frames - 1, -1);
   return motion;
 }
 

@@ -33,6 +33,24 @@ void requireTime(const Eigen::VectorXd& time) {
   }
 }
 
+void requireFrames(const char* name, const Eigen::MatrixXd& values, Eigen::Index size,
+                   const char* unit, Eigen::Index frames) {
+  requireSize(name, values.rows(), size, unit);
+  requireSize(name, values.cols(), frames, "frames");
+  for (Eigen::Index frame = 0; frame < frames; ++frame)
+    if (!areFinite(values.col(frame)))
+      throwInvalid(name, " must be finite, got another number in frame ", frame);
+}
+
+void requireConfigurations(const pinocchio::Model& model, const Eigen::MatrixXd& q,
+                           Eigen::Index frames) {
+  requireFrames("q", q, model.nq, "components (nq)", frames);
+  const MotionCheck check(model);
+  for (Eigen::Index frame = 0; frame < frames; ++frame)
+    if (!check.isConfiguration(q.col(frame)))
+      throwInvalid("q must have quaternions of norm 1, got another in frame ", frame);
+}
+
 MotionCheck::MotionCheck(const pinocchio::Model& model) : model_(model) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(model.njoints); ++k) {
     const pinocchio::JointModel& joint = model.joints[k];

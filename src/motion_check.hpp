@@ -16,6 +16,15 @@ bool hasFreeFlyer(const pinocchio::Model& model);
 /// @throws std::invalid_argument unless there is a frame, and times are finite and increase
 void requireTime(const Eigen::VectorXd& time);
 
+/// @throws std::invalid_argument unless there are so many configurations, finite and with
+///         quaternions of norm 1
+void requireConfigurations(const pinocchio::Model& model, const Eigen::MatrixXd& q,
+                           Eigen::Index frames);
+
+/// @throws std::invalid_argument unless values have that size, and are finite
+void requireFrames(const char* name, const Eigen::MatrixXd& values, Eigen::Index size,
+                   const char* unit, Eigen::Index frames);
+
 /// Looks at motions frame by frame, fast, for what Motion::validate() would refuse, and says no
 /// more than that.
 class MotionCheck {

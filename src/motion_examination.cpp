@@ -13,8 +13,8 @@
 namespace dynacom {
 
 void ExaminationSettings::validate() const {
-  internal::requireField(cutoff >= 0. && std::isfinite(cutoff), "ExaminationSettings.cutoff",
-                         "finite and >= 0 Hz", cutoff);
+  internal::requireField(std::isnan(cutoff) || (cutoff >= 0. && std::isfinite(cutoff)),
+                         "ExaminationSettings.cutoff", "finite and >= 0 Hz, or NaN", cutoff);
   analysis.validate();
   detection.validate();
   verdict.validate();

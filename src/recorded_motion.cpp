@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "dynacom/recorded_motion.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "check.hpp"
+#include "dynacom/centroidal.hpp"
 #include "motion_check.hpp"
 #include "nan.hpp"
 
@@ -30,6 +32,47 @@ double largestStep(const Eigen::VectorXd& time) {
   return (time.tail(steps) - time.head(steps)).maxCoeff();
 }
 
+// Estimates the noise, and says which cut-off suits it.
+double chooseCutoff(const pinocchio::Model& model, const Eigen::VectorXd& time,
+                    const Eigen::MatrixXd& q, DerivedMotion& derived) {
+  const double rate = derived.frame_rate;
+  derived.noise = derived.thinned_noise = estimateAccelerationNoise(model, time, q);
+  if (rate >= 1.5 * kThinnedRate) {
+    const auto stride = static_cast<Eigen::Index>(std::round(rate / kThinnedRate));
+    const double thinned = estimateAccelerationNoise(model, time, q, stride);
+    if (!std::isnan(thinned)) derived.thinned_noise = thinned;
+  }
+  if (!(derived.thinned_noise <= kExactNoise))
+    return std::isnan(rate) ? kMeasuredCutoff
+                            : std::min(kMeasuredCutoff, kMeasuredCutoffPart * rate);
+  return derived.noise <= kExactNoise ? 0. : kRoundedCutoff;
+}
+
+// Marks the frames near one end, the first or the last, of a motion that was filtered.
+void markUnsure(const pinocchio::Model& model, bool is_first, DerivedMotion& derived) {
+  constexpr Eigen::Index kSamples = 8;
+  constexpr double kStandardGravity = 9.81;
+  const Motion& motion = derived.motion;
+  const Eigen::Index last = motion.frames() - 1;
+  const auto periods = [&](double count) {
+    return std::min(static_cast<Eigen::Index>(count * derived.frame_rate / derived.cutoff), last);
+  };
+  pinocchio::Data data(model);
+  double force = 0., torque = 0.;
+  for (Eigen::Index sample = 0; sample < kSamples; ++sample) {
+    const Eigen::Index away = sample * periods(1.) / (kSamples - 1);
+    const Eigen::Index frame = is_first ? away : last - away;
+    const CentroidalState state = computeCentroidalState(model, data, motion.q.col(frame),
+                                                         motion.v.col(frame), motion.a.col(frame));
+    const double weight = state.mass * kStandardGravity;
+    force += (state.acom / kStandardGravity).squaredNorm() / double(kSamples);
+    torque += (state.amVariation / weight).squaredNorm() / double(kSamples);
+  }
+  if (std::sqrt(force) <= kUnsureForce && std::sqrt(torque) <= kUnsureTorque) return;
+  const Eigen::Index count = periods(0.5) + 1;
+  (is_first ? derived.unsure.head(count) : derived.unsure.tail(count)).setConstant(true);
+}
+
 }  // namespace
 
 double findFrameRate(const Eigen::VectorXd& time) {
@@ -48,7 +91,12 @@ DerivedMotion rederiveMotion(const pinocchio::Model& model, const RecordedMotion
   DerivedMotion derived = {};
   derived.mismatch = {kNaN, kNaN};
   derived.frame_rate = findFrameRate(recorded.time);
+  derived.noise = derived.thinned_noise = kNaN;
   const bool is_even = !std::isnan(derived.frame_rate);
+  const Eigen::VectorXd time = is_even ? makeEven(recorded.time) : recorded.time;
+  derived.is_automatic = std::isnan(cutoff) && recorded.time.size() > 1;
+  if (std::isnan(cutoff))
+    cutoff = derived.is_automatic ? chooseCutoff(model, time, recorded.q, derived) : 0.;
   if (!(cutoff >= 0.) || !std::isfinite(cutoff))
     throwInvalid("cutoff must be finite and >= 0 Hz, got ", cutoff);
   if (cutoff > 0. && recorded.time.size() > 1) {
@@ -58,13 +106,15 @@ DerivedMotion rederiveMotion(const pinocchio::Model& model, const RecordedMotion
                    " s; without a filter (cutoff 0) they need not be");
     derived.cutoff = cutoff;
   }
-  const Eigen::VectorXd time = is_even ? makeEven(recorded.time) : recorded.time;
   derived.motion = differentiate(
       model, time,
       derived.cutoff > 0.
           ? filterConfigurations(model, recorded.q, derived.frame_rate, derived.cutoff)
           : recorded.q);
   derived.motion.time = recorded.time;
+  derived.unsure.setConstant(recorded.time.size(), false);
+  if (derived.cutoff > 0.)
+    for (const bool is_first : {true, false}) markUnsure(model, is_first, derived);
   if (is_even) derived.time_error = (recorded.time - time).cwiseAbs().maxCoeff();
   return derived;
 }
@@ -81,8 +131,16 @@ DerivedMotion deriveMotion(const pinocchio::Model& model, const RecordedMotion& 
   if (recorded.v.cols() > 0 && recorded.a.cols() > 0) {
     Motion motion{recorded.time, recorded.q, recorded.v, recorded.a};
     mismatch = compareDerivatives(model, motion);
-    if (mismatch.velocity <= kVelocityMismatch && mismatch.acceleration <= kAccelerationMismatch)
-      return {std::move(motion), true, mismatch, findFrameRate(recorded.time), 0., 0.};
+    if (mismatch.velocity <= kVelocityMismatch && mismatch.acceleration <= kAccelerationMismatch) {
+      DerivedMotion derived = {};
+      derived.motion = std::move(motion);
+      derived.is_recorded = true;
+      derived.mismatch = mismatch;
+      derived.frame_rate = findFrameRate(recorded.time);
+      derived.noise = derived.thinned_noise = kNaN;
+      derived.unsure.setConstant(recorded.time.size(), false);
+      return derived;
+    }
   }
   DerivedMotion derived = rederiveMotion(model, recorded, cutoff);
   derived.mismatch = mismatch;

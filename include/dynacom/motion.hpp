@@ -32,7 +32,10 @@ constexpr double kMaximalCutoff = 0.4;
 ///
 /// Positions of free-flyers are filtered in the world, orientations and joints in the tangent space
 /// at the filter's last output, which slides along the motion: for joints that are numbers this is
-/// the ordinary filter. Beyond both ends, the motion is continued by its point reflection there.
+/// the ordinary filter. Beyond both ends, the motion is continued by its point reflection there, plus
+/// a constant acceleration: three quarters of that of the parabola that fits the last half period of
+/// the cut-off best. What the motion really did there, nobody knows: accelerations within half a
+/// period of an end can be as wrong as they are large.
 /// @param q       configurations, nq × frames
 /// @param rate    frames per second, evenly spaced [Hz]
 /// @param cutoff  0 < cutoff < kMaximalCutoff rate [Hz]
@@ -45,12 +48,30 @@ DYNACOM_EXPORT Eigen::MatrixXd filterConfigurations(const pinocchio::Model& mode
 
 /// The motion through given configurations: velocities and accelerations are those of the parabola
 /// through a frame and its two neighbours, in the tangent space at the frame, so that they are as
-/// Pinocchio wants them. At both ends it is the neighbour's parabola.
+/// Pinocchio wants them. At both ends it is the polynomial of third order through four frames.
 /// @param time  frames, strictly increasing [s]
 /// @param q     configurations, nq × frames
 /// @throws std::invalid_argument as Motion::validate()
 DYNACOM_EXPORT Motion differentiate(const pinocchio::Model& model, const Eigen::VectorXd& time,
                                     const Eigen::MatrixXd& q);
+
+/// How noisy accelerations of the centre of mass are, if they are computed from every stride-th
+/// configuration without a filter: the deviation of their noise, in standard gravities.
+///
+/// It is that of the difference of sixth order, which takes smooth motions away and leaves what is
+/// random from frame to frame: per axis, the lower quartile of |Δ⁶c| as that of a normal
+/// distribution with deviation √924 σ, then √6 ‖σ‖ / Δt². A quartile, because of three quarters of
+/// them a contact may begin or end. Frames need not be evenly spaced: divided differences are taken.
+/// They are a sample, up to 640, of where the configuration moves at least half as much as in the
+/// root mean square over the motion.
+/// @param time    frames, strictly increasing [s]
+/// @param q       configurations, nq × frames
+/// @param stride  of the frames that are looked at, >= 1
+/// @return [g]; NaN if there are fewer than seven such frames, or the robot has no mass
+/// @throws std::invalid_argument as Motion::validate(), or if the stride is out of its range
+DYNACOM_EXPORT double estimateAccelerationNoise(const pinocchio::Model& model,
+                                                const Eigen::VectorXd& time,
+                                                const Eigen::MatrixXd& q, Eigen::Index stride = 1);
 
 /// How well derivatives fit what they are the derivatives of.
 struct DerivativeMismatch {

@@ -16,8 +16,9 @@ namespace dynacom {
 
 /// What examineMotion() needs to know besides.
 struct DYNACOM_EXPORT ExaminationSettings {
-  /// Of the filter where velocities and accelerations have to be computed [Hz]; 0 for none.
-  double cutoff = 6.;
+  /// Of the filter where velocities and accelerations have to be computed [Hz]; 0 for none, and
+  /// kAutomaticCutoff (NaN) for what suits the motion, see deriveMotion().
+  double cutoff = kAutomaticCutoff;
   /// Its threads do all of it. Its progress is not called: the one below is.
   AnalysisSettings analysis = {};
   DetectionSettings detection = {};
