@@ -1,6 +1,6 @@
 """How far contacts and forces that were found are from measured ones.
 
-Everything here works on arrays alone: (T,) of frames at the times `time` [s], which are evenly spaced.
+Everything here works on arrays alone: (T,) of frames at the times `time` [s], evenly spaced.
 """
 
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from scipy.ndimage import minimum_filter1d
 from scipy.optimize import linear_sum_assignment
 from scipy.signal import butter, filtfilt
 
-# A foot bears load above this part of the robot's weight, and touches above that one; where the file
-# says what touches, it is believed, and so are loads above the third.
+# A foot bears load above the first part of the robot's weight, and touches above the second; where
+# the file says what touches, it is believed, and so are loads above the third.
 LOADED, TOUCHING, TOUCHING_BESIDE = 0.05, 0.01, 0.002
 # Gaps of the load under the first are none; loads and unloaded times count from the second on [s].
 SHORTEST_GAP, SHORTEST = 0.03, 0.1
@@ -19,7 +19,8 @@ SHORTEST_GAP, SHORTEST = 0.03, 0.1
 FARTHEST = 0.25
 # How far from other states a frame must be to be surely loaded or surely free [s].
 SURELY = 0.04
-# What is left out at both ends of a clip, where its accelerations are poor: of changes, of forces [s].
+# What is left out at both ends of a clip, of changes and of forces, as accelerations are poor
+# there [s].
 CHANGE_MARGIN, FORCE_MARGIN = 0.12, 0.1
 # Both forces are filtered alike before they are compared: cut-off [Hz] and order, both ways.
 FORCE_CUTOFF, FORCE_ORDER = 10.0, 2
@@ -139,7 +140,7 @@ def wrong_frames(found, truth, time, measured):
     """Frames that surely bear load and were not found, and that are surely free and were.
 
     Returns:
-        (lost, loaded, made up, free): numbers of frames; the second and fourth are how many are sure.
+        (lost, loaded, made up, free): numbers of frames; loaded and free are all that are sure.
     """
     frames = int(round(SURELY / np.median(np.diff(time))))
     width = 2 * max(1, frames) + 1
@@ -166,7 +167,7 @@ def low_pass(values, time):
 
 
 def compared(time, measured):
-    """Runs of frames whose forces are known, as slices, each with the frames in it to be compared."""
+    """Runs of frames whose forces are known: slices, each with a mask of what to compare of it."""
     inside = (time > time[0] + FORCE_MARGIN) & (time < time[-1] - FORCE_MARGIN)
     return [
         (slice(*run), inside[slice(*run)])
@@ -203,6 +204,43 @@ def cop_error(found, known, time, measured, weight):
         return np.full(2, np.nan)
     places = [part[enough, 1:] / part[enough, :1] for part in (found, known)]
     return rms(places[0] - places[1])
+
+
+def compare_changes(found, known, same, farthest=25):
+    """How the changes of contact in one schedule are unlike those in another.
+
+    Args:
+        found, known: (T, C), bool: which contacts are active.
+        same: how many frames apart changes may be to be the same.
+        farthest: how many frames apart they may be to be one that was moved.
+
+    Returns:
+        How many `changes` are known, how many of them `moved` by more than `same` frames, the
+        `worst` of these distances [frames], how many are `gone`, and how many were `made_up`.
+    """
+    changes, distances, extra = 0, [], 0
+    for one, other in zip(found.T.astype(int), known.T.astype(int), strict=True):
+        for sign in (-1, 1):
+            at, wanted = (np.flatnonzero(np.diff(steps) == sign) for steps in (one, other))
+            changes += len(wanted)
+            apart = np.abs(wanted[:, None] - at[None])
+            # Far ones cost the same, so that one of them more is worse than all that can be gained.
+            pairs = linear_sum_assignment(np.minimum(apart, farthest + 1))
+            near = apart[pairs][apart[pairs] <= farthest]
+            distances += near.tolist()
+            extra += len(at) - len(near)
+    return {
+        "changes": changes,
+        "moved": sum(distance > same for distance in distances),
+        "worst": max(distances, default=0),
+        "gone": changes - len(distances),
+        "made_up": extra,
+    }
+
+
+def share(part, whole):
+    """In percent, 0 of nothing."""
+    return 100 * part / max(whole, 1)
 
 
 def rms(values):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import truth_metrics as metrics
+from truth_metrics import share
 
 
 def rotate(quaternions, vectors):
@@ -36,7 +37,7 @@ def presses(force, place):
 
 def score_contacts(report, trial):
     """Changes of contact, and frames that are wrong: of all feet together."""
-    errors, lost, made = [], [], []
+    errors, lost, made, active = [], [], [], []
     for index, foot in enumerate(trial.feet):
         touch = None if trial.touch is None else trial.touch[:, index]
         truth = metrics.true_contact(trial.force[:, index, 2], trial.time, trial.weight, touch)
@@ -45,6 +46,7 @@ def score_contacts(report, trial):
         wrong = metrics.wrong_frames(found, truth, trial.time, trial.measured)
         lost.append(share(*wrong[:2]))
         made.append(share(*wrong[2:]))
+        active.append(share(int(found.sum()), len(found)))
     seen = 1e3 * np.array([error for error in errors if np.isfinite(error)])
     return {
         "changes": len(errors),
@@ -53,6 +55,7 @@ def score_contacts(report, trial):
         "worst": float(seen.max()) if len(seen) else None,
         "lost": max(lost),
         "made_up": max(made),
+        "active": active,
     }
 
 
@@ -95,11 +98,6 @@ def score(report, trial):
         "statuses": {name: value for name, value in statuses.items() if value},
         "codes": list(report.summary["codes"]),
     }
-
-
-def share(part, whole):
-    """In percent, 0 of nothing."""
-    return 100 * part / max(whole, 1)
 
 
 def number(value):

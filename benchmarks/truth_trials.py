@@ -1,4 +1,4 @@
-"""Motions whose contact forces were measured or simulated: ../shared/data/forces, SOURCES.md there."""
+"""Motions whose contact forces were measured or simulated: SOURCES.md in ../shared/data/forces."""
 
 import tempfile
 from dataclasses import dataclass, replace
@@ -12,8 +12,8 @@ import dynacom
 
 # By how much the forces of these come late [s].
 LAGS = {"icub": 0.05}
-# A foot is in contact where it bears more than this part of m g; where forces were measured rather than
-# simulated, also more than this [N], below which they are noise.
+# A foot is in contact where it bears more than this part of m g; where forces were measured rather
+# than simulated, also more than this [N], below which they are noise.
 CONTACT_SHARE, CONTACT_FORCE = 0.02, 20.0
 # What is added as noise, to the root's place and what slides, and to what turns: [m], [rad].
 NOISE = 1e-3, 2e-3
