@@ -1,15 +1,6 @@
 """Measures how true contacts and forces of dynacom.analyze are, beside measured and simulated ones.
 
-usage: truth.py [--sensitivity] [--json FILE] [FOLDER]
-       truth.py --quick [--only NAMES] [--measured] [--noise] [--cutoff HZ] [FOLDER]
-       truth.py --page
-
-FOLDER has trials and robots, ../shared/data/forces by default; the folders above it have clips.
-Figures go to docs/truth.json and from there to docs/truth.md, or else to FILE alone. --sensitivity
-measures also what constants and a minute of standing change; without it, those figures are kept.
---page measures nothing, but writes docs/truth.md again. --quick prints a line per trial, with what
-is found at the cut-off that suits it, or HZ (0: no filter), perhaps with --noise on its poses, and
---measured another one, with the measured contacts; it writes nothing.
+Figures are kept in docs/truth.json, and docs/truth.md is written from those.
 """
 
 import argparse
@@ -17,9 +8,9 @@ import datetime
 import json
 from pathlib import Path
 
-import numpy as np
 import truth_clips
 import truth_page
+import truth_quick
 import truth_robustness
 import truth_trials
 from truth_scores import score
@@ -29,63 +20,6 @@ FOLDER = ROOT.parent / "shared" / "data" / "forces"
 WALKS = ROOT / "examples" / "data"
 DIGITS = 4  # of what is kept
 LONGEST_LINE = 600
-
-
-# ---- Quickly ----
-
-
-def text(value, form):
-    """A number that may not exist."""
-    return format(float("nan") if value is None else value, form)
-
-
-def line(label, figures):
-    """The figures of a trial for a terminal."""
-    feet = " ".join(f"{value:4.1f}" for value in figures["feet"])
-    return (
-        f"{label:28s} {text(figures['median'], '4.0f')} /{text(figures['worst'], '4.0f')} ms, "
-        f"missed {figures['missed']:2d} of {figures['changes']:3d}, lost {figures['lost']:5.1f}, "
-        f"made up {figures['made_up']:5.1f} %, f_z {feet:19s} %, "
-        f"Solved {figures['statuses'].get('Solved', 0):3.0f} %, {','.join(figures['codes'])}"
-    )
-
-
-def medians(label, rows):
-    """The medians of all trials for a terminal."""
-
-    def median(key):
-        values = [row[key] for row in rows if row[key] is not None]
-        return np.median(values) if values else float("nan")
-
-    feet = np.median(np.concatenate([row["feet"] for row in rows]))
-    missed, changes = (sum(row[key] for row in rows) for key in ("missed", "changes"))
-    return (
-        f"{label:28s} {median('median'):4.0f} /{median('worst'):4.0f} ms, "
-        f"missed {missed:2d} of {changes:3d}, lost {median('lost'):5.1f}, "
-        f"made up {median('made_up'):5.1f} %, f_z {feet:4.1f} %"
-    )
-
-
-def quick(trials, arguments):
-    """A line per trial, and their medians."""
-    found, given = [], []
-    for trial in trials:
-        cutoff = trial.noisy_cutoff if arguments.noise else trial.cutoff
-        if arguments.cutoff is not None:
-            cutoff = arguments.cutoff or None
-        moved = truth_trials.with_noise(trial) if arguments.noise else trial
-        found.append(score(truth_trials.analyze(moved, cutoff), trial))
-        print(line(trial.name, found[-1]), flush=True)
-        if arguments.measured:
-            schedule = truth_trials.measured_schedule(trial)
-            given.append(score(truth_trials.analyze(moved, cutoff, schedule), trial))
-            print(line("  with the measured contacts", given[-1]), flush=True)
-    print(medians("medians", found))
-    if given:
-        print(medians("  with the measured contacts", given))
-
-
-# ---- Thoroughly ----
 
 
 def measure_trial(trial):
@@ -156,27 +90,52 @@ def record(figures, path):
     path.write_text(written(kept | rounded(figures)) + "\n", encoding="utf-8")
 
 
+def quick(parser, arguments):
+    """Prints a line for each motion that is asked for."""
+    folder, names = arguments.folder, arguments.only.split(",") if arguments.only else []
+    paths = sorted(folder.glob("*.npz"))
+    known = {path.stem for path in paths} | {sample.name for sample in truth_clips.SAMPLES}
+    if unknown := sorted(set(names) - known):
+        parser.error(f"{', '.join(unknown)} is none of {', '.join(sorted(known))}")
+    chosen = [path for path in paths if not names or path.stem in names]
+    trials = map(truth_trials.read_trial, chosen)
+    if arguments.clips:
+        truth_quick.print_clips(folder.parent, names)
+    elif arguments.standing:
+        truth_quick.print_standing(trials, folder.parent, names)
+    elif chosen:
+        truth_quick.print_trials(trials, arguments.cutoff, arguments.noise, arguments.measured)
+    else:
+        parser.error(f"no trials in {folder}")
+
+
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, usage="see below"
+    parser = argparse.ArgumentParser(description=__doc__)
+    add = parser.add_argument
+    add(
+        "folder",
+        type=Path,
+        nargs="?",
+        default=FOLDER,
+        help="has trials and robots, and the folder above it clips (%(default)s)",
     )
-    parser.add_argument("folder", type=Path, nargs="?", default=FOLDER)
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    for flag in ("--sensitivity", "--page", "--quick", "--measured", "--noise"):
-        parser.add_argument(flag, action="store_true")
-    parser.add_argument("--only", metavar="NAMES")
-    parser.add_argument("--cutoff", type=float, metavar="HZ")
+    add("--json", type=Path, metavar="FILE", help="keep the figures here, and write no page")
+    add("--sensitivity", action="store_true", help="what constants and a minute of standing change")
+    add("--page", action="store_true", help="measure nothing, but write the page again")
+    add("--quick", action="store_true", help="print a line per trial, and write nothing")
+    add("--only", metavar="NAMES", help="quick: of these, with commas between them")
+    add("--clips", action="store_true", help="quick: clips instead of trials")
+    add("--standing", action="store_true", help="quick: both, with a minute of standing")
+    add("--measured", action="store_true", help="quick: with the measured contacts, too")
+    add("--noise", action="store_true", help="quick: with noise on the poses")
+    add("--cutoff", type=float, metavar="HZ", help="quick: of the filter, 0 for none")
     arguments = parser.parse_args()
-    if not arguments.quick and (arguments.only or arguments.measured or arguments.noise):
-        parser.error("--only, --measured and --noise are for --quick")
     if arguments.quick:
-        paths = sorted(arguments.folder.glob("*.npz"))
-        wanted = arguments.only.split(",") if arguments.only else [path.stem for path in paths]
-        if not paths or set(wanted) - {path.stem for path in paths}:
-            parser.error(f"not all of {', '.join(wanted) or 'the trials'} in {arguments.folder}")
-        chosen = [path for path in paths if path.stem in wanted]
-        quick(map(truth_trials.read_trial, chosen), arguments)
+        quick(parser, arguments)
         return
+    for name in ("only", "clips", "standing", "measured", "noise", "cutoff"):
+        if getattr(arguments, name) not in (None, False):
+            parser.error(f"--{name} is for --quick")
     if not arguments.page:
         figures = measure(arguments.folder, arguments.sensitivity)
         record(figures, arguments.json or truth_page.FIGURES)

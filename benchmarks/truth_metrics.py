@@ -84,8 +84,7 @@ def true_contact(force, time, weight, touch=None):
             loaded[slice(*run)] = True
     for run in runs(loaded):
         if inner(run) and lasting(run, time) < SHORTEST:
-            loaded[slice(*run)] = False
-            touching[slice(*run)] = True  # a bounce
+            loaded[slice(*run)] = False  # a bounce, which touches
     changes, free = [], np.zeros(frames, dtype=bool)
     for begin, end in runs(~loaded):
         if lasting((begin, end), time) < SHORTEST:

@@ -101,9 +101,11 @@ def poses_of_trial(trial):
     return Poses(trial.name, trial.robot, rate, trial.q, options)
 
 
-def poses_of_samples(data):
-    """The clips that can be read and are evenly spaced."""
+def poses_of_samples(data, names=None):
+    """The clips that can be read; those of `names`, or all."""
     for sample in truth_clips.SAMPLES:
+        if names and sample.name not in names:
+            continue
         try:
             clip = truth_clips.analyze_sample(sample, data).clip
         except dynacom.DynacomError:
