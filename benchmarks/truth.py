@@ -137,6 +137,8 @@ def main():
         if getattr(arguments, name) not in (None, False):
             parser.error(f"--{name} is for --quick")
     if not arguments.page:
+        if not list(arguments.folder.glob("*.npz")):
+            parser.error(f"no trials in {arguments.folder}")
         figures = measure(arguments.folder, arguments.sensitivity)
         record(figures, arguments.json or truth_page.FIGURES)
     if not arguments.json:
