@@ -16,6 +16,7 @@ BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", (ROOT / "README.md").read_text(), 
 TAKE_LONG = {
     "scripts/test --sanitize": "ThreadSanitizer",
     "scripts/reliability": "1,000,000 of all sorts, each answer certified",
+    "scripts/truth": "beside motions whose forces were measured or simulated",
 }
 
 
