@@ -120,8 +120,6 @@ void exposeMotionAnalysis() {
                     "Centre of pressure in the surface's plane, (T, 2) [m]; NaN without load")
       .add_property("friction_usage", getter(&Contact::friction_usage),
                     "(T,), 1 on the friction pyramid; NaN where not active")
-      .add_property("cone_usage", getter(&Contact::cone_usage),
-                    "(T,), 1 on the friction cone; NaN where not active")
       .add_property("yaw_usage", getter(&Contact::yaw_usage), "Likewise, of the yaw moment")
       .add_property("cop_margin", getter(&Contact::cop_margin),
                     "Distance of cop to the nearest edge, (T,) [m]; NaN without load or edges")

@@ -8,8 +8,9 @@
 #include <utility>
 
 #include "check.hpp"
-#include "cone_usage.hpp"
 #include "contact_frame.hpp"
+#include "dynacom/contact6d.hpp"
+#include "dynacom/contact_point.hpp"
 #include "nan.hpp"
 
 namespace dynacom {
@@ -62,7 +63,6 @@ class Gatherer {
  public:
   Gatherer(const DynaCoM& robot, const std::string& name)
       : contact_(robot.getContact(name)->clone()),
-        mu_(internal::findFriction(*contact_)),
         minimal_force_(robot.getMinimalVerticalForce()),
         force_(Eigen::VectorXd::Zero(contact_->cols())) {}
 
@@ -79,12 +79,11 @@ class Gatherer {
     result.friction_usage[frame] = usage(contact_->getFrictionUsage());
     result.yaw_usage[frame] = usage(contact_->getYawUsage());
     result.cop_margin[frame] = loaded ? contact_->getCoPMargin() : kNaN;
-    result.cone_usage[frame] = internal::findConeUsage(force_.head<3>(), mu_, minimal_force_);
   }
 
  private:
   const std::shared_ptr<ContactBase> contact_;
-  const double mu_, minimal_force_;
+  const double minimal_force_;
   Eigen::VectorXd force_;
 };
 
@@ -95,8 +94,7 @@ MotionAnalysis::Contact makeContact(const std::string& name, Eigen::Index frames
   contact.wrench.setZero(6, frames);
   contact.vertical_force.setZero(frames);
   contact.cop.setConstant(2, frames, kNaN);
-  for (Eigen::VectorXd* values : {&contact.friction_usage, &contact.cone_usage, &contact.yaw_usage,
-                                  &contact.cop_margin})
+  for (Eigen::VectorXd* values : {&contact.friction_usage, &contact.yaw_usage, &contact.cop_margin})
     values->setConstant(frames, kNaN);
   return contact;
 }

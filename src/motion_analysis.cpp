@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "check.hpp"
-#include "cone_usage.hpp"
 #include "contact_frame.hpp"
+#include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "lane_analysis.hpp"
 #include "motion_check.hpp"
@@ -59,7 +59,7 @@ MotionAnalysis makeStorage(const std::vector<std::string>& names, const Motion& 
     contact.wrench.resize(6, frames);
     contact.cop.resize(2, frames);
     for (Eigen::VectorXd* values : {&contact.vertical_force, &contact.friction_usage,
-                                    &contact.yaw_usage, &contact.cop_margin, &contact.cone_usage})
+                                    &contact.yaw_usage, &contact.cop_margin})
       values->resize(frames);
     result.contacts.push_back(std::move(contact));
   }
@@ -328,15 +328,6 @@ MotionAnalysis internal::analyzeMotion(Desks& desks, double ground_height, const
     motion.validate(robot.getModel());
     throw;
   }
-  for (MotionAnalysis::Contact& contact : result.contacts) {
-    const double mu = internal::findFriction(*robot.getContact(contact.name));
-    for (Eigen::Index frame = 0; frame < motion.frames(); ++frame)
-      contact.cone_usage[frame] =
-          contact.active[frame] ? internal::findConeUsage(contact.wrench.col(frame).head<3>(), mu,
-                                                          robot.getMinimalVerticalForce())
-                                : kNaN;
-  }
-
   result.omega = settings.omega;
   if (result.omega == 0.)
     result.omega = computeOmega(result.com, -robot.getSettings().gravity.z(), ground_height);

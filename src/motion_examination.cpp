@@ -131,8 +131,12 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   };
 
   {
-    const MotionAnalysis dynamics = analyze(motion, {}, robot.getGroundHeight());
-    const bool exact = found.derived.cutoff == 0.;
+    ContactSchedule none;
+    none.active.resize(0, motion.frames());
+    const MotionAnalysis dynamics = analyze(motion, none, robot.getGroundHeight());
+    const DerivedMotion& derived = found.derived;
+    const bool exact = derived.cutoff == 0. ||
+                       (derived.is_automatic && derived.thinned_noise <= kExactNoise);
     const auto infer = [&](const ContactSchedule* schedule) {
       return inferContacts(parts, found.part_motions, dynamics, exact, settings.detection,
                            schedule);

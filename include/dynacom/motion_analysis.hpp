@@ -53,9 +53,6 @@ struct MotionAnalysis {
     /// getContactCoPMargin() [m]; NaN where not active.
     Eigen::Matrix2Xd cop;
     Eigen::VectorXd friction_usage, yaw_usage, cop_margin;
-    /// ‖(f_x, f_y)‖ / (μ f_z): 1 on the friction cone, which the pyramid of friction_usage goes
-    /// around. Zero below the minimal vertical force, NaN without friction or where not active.
-    Eigen::VectorXd cone_usage;
   };
 
   double omega;  ///< The ω in use; NaN where there is none, and then vrp, nl and dcm are NaN.

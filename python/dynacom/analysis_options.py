@@ -7,8 +7,8 @@ A settings file is YAML; what it does not name stays at its default::
     omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
     flat: true            # the ground is flat and horizontal: see the CoP
     detection:            # DetectionSettings, field by field
-      height: 0.015
-      ground_height: null # [m]; null if it is to be estimated
+      ground_height: null # [m]; null if it is to be found
+      ground_velocity: [-1.0, 0.0, 0.0] # a treadmill's [m/s]; null if it is to be found
     verdict:              # VerdictSettings: a limit, and the part of the frames that may exceed it
       residual_force: {limit: 0.1, allowed_share: 0.05}
       minimal_window: 1.0
@@ -19,6 +19,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from dynacom.dynacom_pywrap import DetectionSettings, FaultLimit, VerdictSettings
 from dynacom.errors import DynacomError
@@ -124,12 +126,14 @@ def _to_dict(group: Any) -> dict[str, Any]:
     }
 
 
-def _without_nan(value: float | None) -> float | None:
-    return None if value is None or math.isnan(value) else value
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return None if np.isnan(value).any() else value.tolist()
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 # What null stands for, where it may.
-_NULL = {"cutoff": None, "ground_height": math.nan}
+_NULL = {"cutoff": None, "ground_height": math.nan, "ground_velocity": np.full(3, math.nan)}
 
 
 def _update(group: Any, values: Any, where: str) -> None:
@@ -149,6 +153,12 @@ def _update(group: Any, values: Any, where: str) -> None:
             setattr(group, name, value)
         elif value is None and name in _NULL:
             setattr(group, name, _NULL[name])
+        elif isinstance(now, np.ndarray):
+            if not (isinstance(value, list) and len(value) == 3 and all(map(is_number, value))):
+                raise DynacomError(
+                    f"{where}: {name} must be a list of 3 finite numbers or null, got {value!r}"
+                )
+            setattr(group, name, np.array(value, dtype=float))
         elif is_number(value):
             setattr(group, name, float(value))
         else:

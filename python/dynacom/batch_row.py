@@ -36,6 +36,7 @@ from dynacom.motion_report import (
     window_times,
 )
 from dynacom.robots import Robot
+from dynacom.terrain import ground_heights
 
 if TYPE_CHECKING:
     import pyarrow
@@ -343,9 +344,10 @@ def _report_row(report: MotionReport, name: str) -> Row:
     for code, finding in findings.items():
         for column, _, _ in _FAULT_COLUMNS:
             row[f"{code}.{column}"] = getattr(finding, column)
-    for contact, ground in zip(statistics.contacts, found.ground.tolist(), strict=True):
+    grounds = ground_heights(report.robot, found)
+    for contact in statistics.contacts:
         for column, _, _ in _CONTACT_COLUMNS:
-            value = ground if column == "ground" else getattr(contact, column)
+            value = grounds[contact.name] if column == "ground" else getattr(contact, column)
             row[f"contact.{contact.name}.{column}"] = value
     return {
         column: None if isinstance(value, float) and not math.isfinite(value) else value

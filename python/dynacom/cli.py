@@ -134,7 +134,21 @@ _Cutoff = Annotated[
 ]
 _Ground = Annotated[
     float | None,
-    typer.Option("--ground-height", metavar="H", help="Height of the ground [m]; else estimated."),
+    typer.Option(
+        "--ground-height", metavar="H", help="Height of the ground [m]; else it is found."
+    ),
+]
+_GroundVelocity = Annotated[
+    str | None,
+    typer.Option(
+        "--ground-velocity",
+        metavar="X,Y,Z",
+        help="Velocity of the ground, a treadmill's [m/s]; else it is found.",
+    ),
+]
+_Gravity = Annotated[
+    float | None,
+    typer.Option("--gravity", metavar="G", help="Downward [m/s²]; 9.81 by default, 0 for none."),
 ]
 _Flat = Annotated[
     bool | None,
@@ -175,6 +189,8 @@ def analyze(
     schedule: _Schedule = None,
     cutoff: _Cutoff = None,
     ground_height: _Ground = None,
+    ground_velocity: _GroundVelocity = None,
+    gravity: _Gravity = None,
     flat: _Flat = None,
     omega: _Omega = None,
     settings: _SettingsFile = None,
@@ -205,9 +221,9 @@ def analyze(
 
     report = _analyze(
         clip,
-        _load_robot(robot, urdf, contact, payload),
+        _load_robot(robot, urdf, contact, payload, gravity),
         schedule,
-        _make_options(settings, set_, cutoff, ground_height, flat, omega),
+        _make_options(settings, set_, cutoff, ground_height, ground_velocity, flat, omega),
         fps=fps,
         quat=quat,
         trust=trust,
@@ -238,6 +254,8 @@ def show(
     schedule: _Schedule = None,
     cutoff: _Cutoff = None,
     ground_height: _Ground = None,
+    ground_velocity: _GroundVelocity = None,
+    gravity: _Gravity = None,
     flat: _Flat = None,
     omega: _Omega = None,
     settings: _SettingsFile = None,
@@ -249,9 +267,9 @@ def show(
 
     report = _analyze(
         clip,
-        _load_robot(robot, urdf, contact, payload),
+        _load_robot(robot, urdf, contact, payload, gravity),
         schedule,
-        _make_options(settings, set_, cutoff, ground_height, flat, omega),
+        _make_options(settings, set_, cutoff, ground_height, ground_velocity, flat, omega),
         fps=fps,
         quat=quat,
         trust=trust,
@@ -289,6 +307,8 @@ def batch(
     trust: _Trust = False,
     cutoff: _Cutoff = None,
     ground_height: _Ground = None,
+    ground_velocity: _GroundVelocity = None,
+    gravity: _Gravity = None,
     flat: _Flat = None,
     omega: _Omega = None,
     settings: _SettingsFile = None,
@@ -332,9 +352,11 @@ def batch(
         with _batch_progress() as show:
             found = run_batch(
                 paths,
-                _load_robot(robot, urdf, contact, payload),
+                _load_robot(robot, urdf, contact, payload, gravity),
                 out,
-                options=_make_options(settings, set_, cutoff, ground_height, flat, omega),
+                options=_make_options(
+                    settings, set_, cutoff, ground_height, ground_velocity, flat, omega
+                ),
                 fps=fps,
                 quat=quat,
                 trust=trust,
@@ -374,7 +396,11 @@ def _analyze(motion, robot, schedule, options, **reading) -> "dynacom.MotionRepo
 
 
 def _load_robot(
-    name: str | None, urdf: Path | None, contacts: list[str] | None, payloads: list[str] | None
+    name: str | None,
+    urdf: Path | None,
+    contacts: list[str] | None,
+    payloads: list[str] | None,
+    gravity: float | None,
 ) -> "dynacom.Robot":
     from dynacom.robots import make_robot, parse_payload
 
@@ -385,7 +411,7 @@ def _load_robot(
     robot = dynacom.load_robot(name) if urdf is None else make_robot(urdf, contacts or [])
     for text in payloads or []:
         robot = robot.with_payload(*parse_payload(text))
-    return robot
+    return robot if gravity is None else robot.with_gravity(gravity)
 
 
 def _make_options(
@@ -393,6 +419,7 @@ def _make_options(
     texts: list[str] | None,
     cutoff: float | None,
     ground_height: float | None,
+    ground_velocity: str | None,
     flat: bool | None,
     omega: float | None,
 ) -> "dynacom.AnalysisOptions":
@@ -402,8 +429,18 @@ def _make_options(
     options.update_from_texts(texts or [])
     values = {"cutoff": cutoff, "flat": flat, "omega": omega}
     given = {name: value for name, value in values.items() if value is not None}
+    ground = {}
     if ground_height is not None:
-        given["detection"] = {"ground_height": ground_height}
+        ground["ground_height"] = ground_height
+    if ground_velocity is not None:
+        try:
+            ground["ground_velocity"] = [float(text) for text in ground_velocity.split(",")]
+        except ValueError as error:
+            raise DynacomError(
+                f"--ground-velocity must be X,Y,Z in m/s, got '{ground_velocity}'"
+            ) from error
+    if ground:
+        given["detection"] = ground
     options.update(given, "options")
     return options
 

@@ -32,6 +32,7 @@ from dynacom.motion_file import Clip, read_motion
 from dynacom.results_folder import results_folder
 from dynacom.robots import Robot, load_robot
 from dynacom.schedule_file import read_schedule, write_schedule
+from dynacom.terrain import ground_heights, terrain_texts
 
 if TYPE_CHECKING:
     import pandas
@@ -67,6 +68,7 @@ _FRAME_COLUMNS = (
 )
 _CONTACT_COLUMNS = (
     ("active", ("",), ""),
+    ("confidence", ("",), ""),
     ("force", _XYZ, "N"),
     ("torque", _XYZ, "N m"),
     ("cop", _XY, "m"),
@@ -92,8 +94,6 @@ _CONTACT_STATISTICS = (
 # Where the file says what the contacts felt.
 _MEASURED_COLUMNS = (("measured_force", _XYZ, "N"), ("measured_torque", _XYZ, "N m"))
 
-# From which height on a ground is worth a question: most files have theirs at zero [m].
-_FAR_FROM_ZERO = 0.1
 
 # From which mean residual on it may be a load that nobody has told of [m g], [m g m].
 _LOAD = 0.01
@@ -171,6 +171,9 @@ class MotionReport:
             for name, endings, units in _CONTACT_COLUMNS + _MEASURED_COLUMNS:
                 if (full := f"contact.{contact}.{name}") in self.arrays:
                     yield full, endings, units
+            for part in self.examination.analysis.parts:
+                if part.name.startswith(f"{contact}."):
+                    yield f"contact.{part.name}.active", ("",), ""
 
     def to_dataframe(self) -> "pandas.DataFrame":
         """The table of frames, for pandas.
@@ -271,7 +274,7 @@ def analyze(
 
     Where the file's velocities and accelerations do not agree with its configurations, or it has
     none, they are computed: see ``filterConfigurations`` and ``differentiate``. Contacts are active
-    as `schedule` says, else as the file says, else as ``detectContacts`` finds them.
+    as `schedule` says, else as the file says, else as ``inferContacts`` finds them.
 
     Args:
         motion: a file, see :func:`read_motion`, or what was read from one.
@@ -351,7 +354,7 @@ def _find_schedule(
         return schedule, f"Contacts are active as {given} says."
     if clip.schedule is not None:
         return clip.schedule, "Contacts are active as the file says."
-    return None, "Contacts are found from height and speed."
+    return None, "Contacts are found from where the feet are and from what the motion needs."
 
 
 # The summary.
@@ -366,7 +369,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         *clip.notes,
         derivatives,
         report._schedule_text,
-        _ground_text(robot, found.ground, report.options.detection.same_ground),
+        *terrain_texts(robot, found),
     ]
     solved = statistics.share(DistributionStatus.Solved)
     residual = statistics.mean_residual.tolist()
@@ -398,7 +401,8 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         "derivatives": derivatives,
         "cutoff": derived.cutoff or None,
         "cutoff_sensitivity": sensitivity,
-        "ground": dict(zip(robot.contacts, found.ground.tolist(), strict=True)),
+        "ground": ground_heights(robot, found),
+        "ground_velocity": found.inference.ground_velocity.tolist(),
         "contacts": {
             contact.name: {name: getattr(contact, name) for name in _CONTACT_STATISTICS}
             for contact in statistics.contacts
@@ -435,28 +439,6 @@ def _derivatives_text(clip: Clip, derived: DerivedMotion) -> str:
     if derived.time_error > 1e-6:
         how += f", with times made even, by up to {1e3 * derived.time_error:.2g} ms"
     return f"Velocities and accelerations are computed from the positions, {how}: {reason}."
-
-
-def _ground_text(robot: Robot, ground: np.ndarray, same_ground: float) -> str:
-    if not len(ground):
-        return "The robot has no contacts."
-    heights = ", ".join(
-        f"{name} {height:.3f} m" for name, height in zip(robot.contacts, ground, strict=True)
-    )
-    text = f"Height of the ground: {heights}."
-    lowest = ground.min()
-    if steps := [
-        f"{name} ({height - lowest:.2f} m)"
-        for name, height in zip(robot.contacts, ground, strict=True)
-        if height - lowest > same_ground
-    ]:
-        text += (
-            f" {', '.join(steps)} higher: still there, and so taken to stand on steps."
-            " If they are in the air, --ground-height says where the ground is."
-        )
-    if np.abs(ground).min() > _FAR_FROM_ZERO:
-        text += " None is near the height 0: is it this robot's motion?"
-    return text
 
 
 def _unexplained_text(unexplained: dict[str, Any], weight: float) -> str:
@@ -573,7 +555,8 @@ def _collect_arrays(
     arrays = {name: getattr(analysis, name) for name in names}
     arrays["status"] = np.array([status.name for status in analysis.status])
     arrays["fault"] = _faults_by_frame(found.verdict, options)
-    for contact, moved, height in zip(analysis.contacts, found.contacts, found.ground, strict=True):
+    confidence = found.schedule.confidence
+    for index, (contact, moved) in enumerate(zip(analysis.contacts, found.contacts, strict=True)):
         wrench = contact.wrench
         values = {
             "active": np.asarray(contact.active, dtype=bool),
@@ -586,7 +569,7 @@ def _collect_arrays(
             "cop_margin": contact.cop_margin,
             "position": moved.position,
             "rotation": moved.rotation,
-            "height": moved.height - height,
+            "height": moved.height - found.ground[:, index],
             "speed": np.linalg.norm(moved.velocity, axis=1),
         }
         if contact.name in clip.forces:
@@ -594,7 +577,12 @@ def _collect_arrays(
             values["measured_force"] = measured[:, :3]
             if measured.shape[1] == 6:
                 values["measured_torque"] = measured[:, 3:]
+        if confidence is not None:
+            values["confidence"] = confidence[:, index]
         arrays |= {f"contact.{contact.name}.{name}": array for name, array in values.items()}
+    for part in analysis.parts:
+        if "." in part.name:
+            arrays[f"contact.{part.name}.active"] = np.asarray(part.active, dtype=bool)
     return arrays
 
 

@@ -197,6 +197,23 @@ class Robot:
         model.appendBodyToJoint(holder.parentJoint, load, holder.placement)
         return replace(self, model=model)
 
+    def with_gravity(self, gravity: float) -> "Robot":
+        """A new robot: this one where gravity is another, on the moon say.
+
+        Args:
+            gravity: downward, not negative [m/s^2].
+
+        Raises:
+            DynacomError: the number is negative, or not finite.
+        """
+        if not (math.isfinite(gravity) and gravity >= 0.0):
+            raise DynacomError(
+                f"gravity of {self.name}: must be finite and >= 0 m/s^2, got {gravity}"
+            )
+        model = self.model.copy()
+        model.gravity.linear = np.array([0.0, 0.0, -float(gravity)])
+        return replace(self, model=model)
+
 
 class Payload(NamedTuple):
     """The arguments of :meth:`Robot.with_payload`."""

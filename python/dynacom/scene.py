@@ -199,7 +199,9 @@ class Scene:
         """
         self._scene = server.scene
         self._q, self._arrays = q, arrays
-        self._ground = float(np.median(list(summary["ground"].values()) or [0.0]))
+        self._ground = float(
+            np.median([h for h in summary["ground"].values() if h is not None] or [0.0])
+        )
         #: What lengths are measured by: the height of the CoM.
         self._height = max(float(np.nanmedian(arrays["com"][:, 2])) - self._ground, 0.1)
         self._length_per_newton = self._height / weight(robot, summary)

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""What a motion stands on, in numbers and in sentences."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dynacom.dynacom_pywrap import MotionExamination, Stance
+from dynacom.robots import Robot
+
+# From which height on a ground is worth a question: most files have theirs at zero [m].
+_FAR_FROM_ZERO = 0.1
+# Stances that differ by more than this stand on different levels [m].
+_LEVEL = 0.05
+# A slope is told from this angle on [deg], if the stances are no farther from the plane [m].
+_SLOPE, _PLANE = 1.0, 0.02
+# A foot that is held in the air is worth a word after so long [s].
+_HELD = 0.5
+# Schedules that differ in more of the frames than this are worth a word.
+_DISAGREEMENT = 0.02
+
+
+def ground_heights(robot: Robot, found: MotionExamination) -> dict[str, float | None]:
+    """Contact's name -> the median height of the ground under it while it is active [m].
+
+    None where it never is.
+    """
+    heights = {}
+    for index, name in enumerate(robot.contacts):
+        active = np.asarray(found.schedule.active)[:, index]
+        values = found.ground[active, index]
+        values = values[np.isfinite(values)]
+        heights[name] = float(np.median(values)) if len(values) else None
+    return heights
+
+
+def terrain_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
+    """Sentences on the ground: where it is, how it moves, and what was not taken for it."""
+    heights = ground_heights(robot, found)
+    known = {name: height for name, height in heights.items() if height is not None}
+    velocity = found.inference.ground_velocity
+    if velocity.any():
+        yield (
+            f"The ground moves by ({velocity[0]:.2f}, {velocity[1]:.2f}) m/s: a treadmill. Speeds "
+            "of contacts are relative to it; --ground-velocity says another."
+        )
+    if not heights:
+        yield "The robot has no contacts."
+    elif not known:
+        yield "No contact is ever active."
+    elif slope := _slope_text(found):
+        yield slope
+    else:
+        yield from _level_texts(robot, found, known)
+    yield from _held_texts(robot, found)
+    yield from _disagreement_texts(found)
+
+
+def _name(robot: Robot, found: MotionExamination, stance: Stance) -> str:
+    return list(robot.contacts)[found.parts[stance.part].contact]
+
+
+def _used(found: MotionExamination) -> Iterator[Stance]:
+    """The stances in which their part is active at some time."""
+    active = np.asarray(found.inference.schedule.active)
+    for stance in found.inference.stances:
+        if stance.on_ground and active[stance.first : stance.behind, stance.part].any():
+            yield stance
+
+
+def _slope_text(found: MotionExamination) -> str | None:
+    """If the stances lie in a plane that is not level."""
+    points = []
+    for stance in _used(found):
+        position = found.part_motions[stance.part].position[stance.first : stance.behind]
+        points.append([*position[:, :2].mean(axis=0), stance.height])
+    points = np.array(points).reshape(-1, 3)
+    if len(points) < 6 or np.ptp(points[:, 2]) <= _LEVEL:
+        return None
+    centred = points - points.mean(axis=0)
+    gradient, *_ = np.linalg.lstsq(centred[:, :2], centred[:, 2], rcond=None)
+    off = centred[:, 2] - centred[:, :2] @ gradient
+    angle = np.degrees(np.arctan(np.linalg.norm(gradient)))
+    if angle < _SLOPE or np.abs(off).max() > _PLANE:
+        return None
+    towards = np.degrees(np.arctan2(gradient[1], gradient[0]))
+    return (
+        f"The ground is a slope of {angle:.1f} degrees, which rises towards {towards:.0f} degrees "
+        "from the world's x axis."
+    )
+
+
+def _level_texts(robot: Robot, found: MotionExamination, known: dict[str, float]) -> Iterator[str]:
+    levels: dict[str, list[float]] = {}
+    for stance in _used(found):
+        own = levels.setdefault(_name(robot, found, stance), [])
+        if all(abs(stance.height - level) > _LEVEL for level in own):
+            own.append(stance.height)
+    steps = []
+    for name, own in levels.items():
+        if len(own) > 1:
+            *first, last = (f"{height:.2f}" for height in sorted(own))
+            steps.append(f"{name} stands at {', '.join(first)} and {last} m")
+    if steps:
+        yield f"{'; '.join(steps)}: steps or stairs."
+    else:
+        text = ", ".join(f"{name} {height:.3f} m" for name, height in known.items())
+        yield f"Height of the ground: {text}."
+    if min(abs(height) for height in known.values()) > _FAR_FROM_ZERO:
+        yield "The ground is not near the height 0: is it this robot's motion?"
+
+
+def _held_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
+    """Feet that are at rest where nothing was seen to carry them."""
+    time = found.analysis.time
+    lowest: dict[str, tuple[float, Stance]] = {}
+    on_ground = [stance.height for stance in _used(found)]
+    for stance in found.inference.stances:
+        lasts = time[stance.behind - 1] - time[stance.first]
+        name = _name(robot, found, stance)
+        if stance.on_ground or lasts < _HELD:
+            continue
+        if name not in lowest or stance.height < lowest[name][0]:
+            lowest[name] = (stance.height, stance)
+    for name, (height, stance) in lowest.items():
+        above = height - (np.median(on_ground) if on_ground else 0.0)
+        yield (
+            f"{name} rests {100.0 * above:.0f} cm up at {time[stance.first]:.2f} s, where nothing "
+            "was seen landed on, and so carries nothing: say by --schedule if there is a box."
+        )
+
+
+def _disagreement_texts(found: MotionExamination) -> Iterator[str]:
+    """Contacts that are recorded, but which inference finds otherwise."""
+    if found.inferred is None:
+        return
+    given, own = np.asarray(found.schedule.active), np.asarray(found.inferred.active)
+    shares = (given != own).mean(axis=0)
+    if texts := [
+        f"{name} in {share:.0%}"
+        for name, share in zip(found.schedule.names, shares, strict=True)
+        if share > _DISAGREEMENT
+    ]:
+        yield (
+            "What the motion needs would have contacts differ from those that are given: "
+            f"{', '.join(texts)} of the frames."
+        )
