@@ -247,8 +247,7 @@ BOOST_AUTO_TEST_CASE(contacts_and_verdicts_are_the_same_whatever_the_number_of_t
     const MotionVerdict verdict =
         judgeMotion(robot, motion, recorded, contacts, VectorXd::Zero(4), analysis, {}, threads);
     for (const MotionFinding& finding : verdict.findings) append(numbers, finding.measured);
-    // It was looked for contacts that are missing.
-    BOOST_TEST(verdict[MotionFault::ContactMissing].frames > 50);
+    BOOST_TEST(verdict[MotionFault::CoPOutside].frames > 50);
     return numbers;
   };
   const Numbers serial = judge(1);
