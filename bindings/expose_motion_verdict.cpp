@@ -116,8 +116,7 @@ void exposeMotionVerdict() {
                      "The greatest speed of the root and of prismatic joints [m/s]")
       .def_readwrite("turning_speed", &Settings::turning_speed,
                      "The greatest speed at which the root turns [rad/s]")
-      .def_readwrite("joint_speed", &Settings::joint_speed,
-                     "The greatest speed of joints [rad/s]")
+      .def_readwrite("joint_speed", &Settings::joint_speed, "The greatest speed of joints [rad/s]")
       .def_readwrite("jump_time", &Settings::jump_time,
                      "Frames so close to a jump are unsure, as are two at either side at least [s]")
       .def_readwrite("minimal_window", &Settings::minimal_window,
@@ -134,8 +133,9 @@ void exposeMotionVerdict() {
       .def_readonly("time", &MotionFinding::time, "Of the first frame where that is [s]")
       .def_readonly("holds", &MotionFinding::holds,
                     "Whether more frames than allowed are beyond the limit")
-      .def_readonly("subject", &MotionFinding::subject,
-                    "Whose the worst is: a contact, a joint, 'root', \"root's orientation\"; else ''")
+      .def_readonly(
+          "subject", &MotionFinding::subject,
+          "Whose the worst is: a contact, a joint, 'root', \"root's orientation\"; else ''")
       .def(PrintVisitor<MotionFinding>(&writeFinding))
       .def(CopyVisitor<MotionFinding>());
 

@@ -31,8 +31,8 @@ double distanceToHull(const Vector2d& point, std::vector<Vector2d>& corners) {
   };
   std::sort(corners.begin(), corners.end(), isBefore);
 
-  // Nothing outside the box around a hull is inside the hull. This decides for flat hulls, which have
-  // no inside: what lies on their line, beyond their ends, is on no side of it.
+  // Nothing outside the box around a hull is inside the hull. This decides for flat hulls, which
+  // have no inside: what lies on their line, beyond their ends, is on no side of it.
   const auto [lowest, highest] =
       std::minmax_element(corners.begin(), corners.end(),
                           [](const Vector2d& a, const Vector2d& b) { return a.y() < b.y(); });

@@ -167,6 +167,7 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   const MotionAnalysis analysis = analyze(motion, schedule, ground_height);
   found.verdict = judge(found.derived, found.part_motions, analysis);
   found.analysis = gatherParts(robot, parts, found.contacts, found.part_motions, analysis);
+  found.verdict.normals = internal::findNormals(found.contacts, found.analysis.contacts);
   found.statistics = summarizeMotion(robot, motion, found.analysis, found.verdict);
   for (const double cutoff : cutoffs) {
     const DerivedMotion other = rederiveMotion(robot.getModel(), recorded, cutoff);

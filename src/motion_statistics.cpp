@@ -54,9 +54,9 @@ MotionStatistics::Vector6 findMeanResidual(const pinocchio::Model& model, const 
   MotionStatistics::Vector6 sum = MotionStatistics::Vector6::Zero();
   Eigen::Index frames = 0;
   for (Eigen::Index frame = 0; frame < motion.frames(); ++frame) {
-    const bool flies = std::none_of(
-        analysis.contacts.begin(), analysis.contacts.end(),
-        [&](const MotionAnalysis::Contact& contact) { return contact.active[frame]; });
+    const bool flies =
+        std::none_of(analysis.contacts.begin(), analysis.contacts.end(),
+                     [&](const MotionAnalysis::Contact& contact) { return contact.active[frame]; });
     if (flies || verdict.unsure[frame]) continue;
     ++frames;
     MotionStatistics::Vector6 residual = analysis.residual.col(frame);

@@ -28,4 +28,9 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
                           const Eigen::Array<bool, Eigen::Dynamic, 1>& unsure,
                           const VerdictSettings& settings, Workers& workers);
 
+/// MotionVerdict::normals.
+/// @param contacts, analyzed  of the same contacts, in the same order
+std::vector<ContactNormal> findNormals(const std::vector<ContactMotion>& contacts,
+                                       const std::vector<MotionAnalysis::Contact>& analyzed);
+
 }  // namespace dynacom::internal

@@ -10,9 +10,9 @@
 #include "check.hpp"
 #include "convex_hull.hpp"
 #include "motion_steps.hpp"
+#include "motion_windows.hpp"
 #include "nan.hpp"
 #include "step_speeds.hpp"
-#include "motion_windows.hpp"
 
 namespace dynacom {
 
@@ -51,8 +51,7 @@ constexpr Description kDescriptions[kMotionFaults] = {
     {"ground_penetration", &VerdictSettings::ground_penetration, "m",
      "a contact is below the ground"},
     {"foot_sliding", &VerdictSettings::foot_sliding, "m/s", "an active contact slides"},
-    {"discontinuity", &VerdictSettings::discontinuity, "of the greatest speed",
-     "the motion jumps"},
+    {"discontinuity", &VerdictSettings::discontinuity, "of the greatest speed", "the motion jumps"},
 };
 
 // What else settings have: the name, where it is, and whether it may be 0.
@@ -127,13 +126,13 @@ class SupportMeter {
  private:
   const std::vector<ContactMotion>& contacts_;
   const MotionAnalysis& analysis_;
-  std::vector<Eigen::Matrix2Xd> corners_;    // of each contact, in its surface
+  std::vector<Eigen::Matrix2Xd> corners_;  // of each contact, in its surface
   std::vector<Eigen::Vector2d> carrying_;  // of active contacts in a frame, in the world
 };
 
 // Marks the frames near steps that are faster than they may be.
 void markAroundJumps(const Eigen::VectorXd& time, const Eigen::ArrayXd& speed,
-                     const VerdictSettings& settings, Mask& unsure) {
+                     const VerdictSettings& settings, Mask& near_jumps) {
   const Eigen::Index frames = time.size();
   for (Eigen::Index step = 0; step < speed.size(); ++step) {
     if (!(speed[step] > settings.discontinuity.limit)) continue;
@@ -141,7 +140,7 @@ void markAroundJumps(const Eigen::VectorXd& time, const Eigen::ArrayXd& speed,
     Eigen::Index last = std::min(step + 1 + kJumpFrames, frames - 1);
     while (first > 0 && time[step] - time[first - 1] <= settings.jump_time) --first;
     while (last < frames - 1 && time[last + 1] - time[step + 1] <= settings.jump_time) ++last;
-    unsure.segment(first, last - first + 1).setConstant(true);
+    near_jumps.segment(first, last - first + 1).setConstant(true);
   }
 }
 
@@ -195,15 +194,13 @@ void requireFitting(const DynaCoM& robot, const Motion& motion, const RecordedMo
   if (unsure.size() != 0) requireSize("unsure", unsure.size(), frames, "frames (or none)");
   const std::vector<std::string> names = robot.getKnownContacts();
   requireSize("contacts", contacts.size(), names.size(), "contacts of the robot");
-  requireSize("analysis.contacts", analysis.contacts.size(), names.size(),
-              "contacts of the robot");
+  requireSize("analysis.contacts", analysis.contacts.size(), names.size(), "contacts of the robot");
   for (std::size_t k = 0; k < names.size(); ++k) {
     if (contacts[k].name != names[k] || analysis.contacts[k].name != names[k])
       throwInvalid("contacts must be those of the robot in its order: expected '", names[k],
                    "', got '", contacts[k].name, "' and '", analysis.contacts[k].name, "'");
-    for (const Eigen::Index size :
-         {contacts[k].height.size(), contacts[k].position.cols(), contacts[k].rotation.cols(),
-          contacts[k].velocity.cols()})
+    for (const Eigen::Index size : {contacts[k].height.size(), contacts[k].position.cols(),
+                                    contacts[k].rotation.cols(), contacts[k].velocity.cols()})
       requireSize("contacts", size, frames, "frames");
     requireSize("analysis.contacts", analysis.contacts[k].active.size(), frames, "frames");
   }
@@ -302,6 +299,15 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
                                settings, workers);
 }
 
+std::vector<ContactNormal> internal::findNormals(
+    const std::vector<ContactMotion>& contacts,
+    const std::vector<MotionAnalysis::Contact>& analyzed) {
+  std::vector<ContactNormal> normals;
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    normals.push_back(findNormal(contacts[k], analyzed[k].active));
+  return normals;
+}
+
 MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
                                     const RecordedMotion& recorded,
                                     const std::vector<ContactMotion>& contacts,
@@ -316,10 +322,11 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
   const Eigen::Index frames = motion.frames();
 
   MotionVerdict verdict = {};
-  verdict.unsure = unsure.size() != 0 ? unsure : Mask::Constant(frames, false);
-  const StepSpeeds steps =
-      measureStepSpeeds(robot.getModel(), motion.time, recorded.q, settings);
-  markAroundJumps(motion.time, steps.speed, settings, verdict.unsure);
+  Mask near_jumps = Mask::Constant(frames, false);
+  const StepSpeeds steps = measureStepSpeeds(robot.getModel(), motion.time, recorded.q, settings);
+  markAroundJumps(motion.time, steps.speed, settings, near_jumps);
+  verdict.unsure = near_jumps;
+  if (unsure.size() != 0) verdict.unsure = verdict.unsure || unsure;
 
   const double weight = robot.getMass() * kStandardGravity;
   std::array<Eigen::VectorXd, kMotionFaults> measured;
@@ -357,7 +364,7 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
           depth = std::fmax(depth, findDepth(Eigen::Index(k), frame));
           if (!analysis.contacts[k].active[frame]) continue;
           flies = false;
-          sliding = std::max(sliding, slidingSpeed(contacts[k], frame));
+          if (!near_jumps[frame]) sliding = std::max(sliding, slidingSpeed(contacts[k], frame));
         }
         if (!verdict.unsure[frame]) judgeForces(frame, flies, support);
       }
@@ -381,7 +388,8 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
           const double worst = measured[k][frame];
           if (fault == MotionFault::Discontinuity) return steps.fastest;
           if (fault == MotionFault::GroundPenetration)
-            return nameContact([&](std::size_t i) { return findDepth(Eigen::Index(i), frame) == worst; });
+            return nameContact(
+                [&](std::size_t i) { return findDepth(Eigen::Index(i), frame) == worst; });
           if (fault == MotionFault::FootSliding)
             return nameContact([&](std::size_t i) {
               return analysis.contacts[i].active[frame] &&
@@ -390,13 +398,11 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
           return "";
         });
   }
-  for (std::size_t k = 0; k < contacts.size(); ++k)
-    verdict.normals.push_back(findNormal(contacts[k], analysis.contacts[k].active));
+  verdict.normals = internal::findNormals(contacts, analysis.contacts);
 
   const bool is_too_short = frames < kMinimalFrames && !isRecorded(motion, recorded);
-  const bool any_holds =
-      std::any_of(verdict.findings.begin(), verdict.findings.end(),
-                  [](const MotionFinding& finding) { return finding.holds; });
+  const bool any_holds = std::any_of(verdict.findings.begin(), verdict.findings.end(),
+                                     [](const MotionFinding& finding) { return finding.holds; });
   if (is_too_short || (!any_holds && verdict.unsure.all())) {
     verdict.outcome = MotionOutcome::Unknown;
     return verdict;

@@ -88,7 +88,7 @@ BOOST_AUTO_TEST_CASE(an_examination_is_its_steps) {
     settings.cutoff = 10.;
     settings.analysis.omega = 3.;
     settings.detection.height = 0.01;
-    settings.verdict.near_ground = 0.02;
+    settings.verdict.cop_force = 0.02;
     const MotionExamination found = examineMotion(clips.robot, recorded, settings);
 
     DynaCoM robot = clips.robot;
@@ -301,7 +301,7 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_examined_is_refused) {
   refused([](auto& s) { s.cutoff = std::numeric_limits<double>::infinity(); }, {"finite", "inf"});
   refused([](auto& s) { s.analysis.threads = -1; }, {"AnalysisSettings.threads", "-1"});
   refused([](auto& s) { s.detection.height = -1.; }, {"DetectionSettings.height"});
-  refused([](auto& s) { s.verdict.near_ground = -1.; }, {"VerdictSettings.near_ground"});
+  refused([](auto& s) { s.verdict.cop_force = -1.; }, {"VerdictSettings.cop_force"});
 
   RecordedMotion recorded = clips.make(0);
   recorded.schedule->names[0] = "nose";

@@ -27,7 +27,7 @@ struct Case {
                                    ContactSchedule::Matrix::Constant(2, frames, true)};
     analysis = analyzeMotion(robot, motion, schedule);
     analysis.residual.setZero();
-    for (MotionFinding& finding : verdict.findings) finding.measured.setZero(frames);
+    verdict.unsure.setConstant(frames, false);
   }
 
   MotionStatistics summarize() const { return summarizeMotion(robot, motion, analysis, verdict); }
@@ -103,11 +103,13 @@ BOOST_AUTO_TEST_CASE(the_mean_residual_is_in_the_headings_axes) {
   some.analysis.residual.col(1) << -2., 1., 3., -5., 4., 6.;  // the same, seen from the robot
   some.analysis.residual.col(2).setConstant(1e3);
   some.analysis.residual.col(3).setConstant(1e3);
-  some.verdict.findings[std::size_t(MotionFault::ContactMissing)].measured[2] = 0.1;
-  some.verdict.findings[std::size_t(MotionFault::FlightWithSupportNeeded)].measured[3] = 0.1;
+  some.verdict.unsure[2] = true;
+  for (MotionAnalysis::Contact& contact : some.analysis.contacts) contact.active[3] = false;
   const Vector6 expected = (Vector6() << 1., 2., 3., 4., 5., 6.).finished();
   BOOST_TEST(close(some.summarize().mean_residual, expected));
-  some.verdict.findings[std::size_t(MotionFault::ContactMissing)].measured.setOnes();
+  some.analysis.contacts[1].active[3] = true;  // one suffices
+  BOOST_TEST(some.summarize().mean_residual[0] > 300.);
+  some.verdict.unsure.setConstant(true);
   BOOST_TEST(some.summarize().mean_residual.isZero(0.));
 }
 
@@ -124,8 +126,13 @@ BOOST_AUTO_TEST_CASE(without_a_free_flyer_axes_are_the_worlds) {
                       MatrixXd::Zero(6, 2)};
   MotionAnalysis analysis = analyzeMotion(robot, motion, {{}, ContactSchedule::Matrix(0, 2)});
   analysis.residual.setOnes();
+  analysis.contacts.emplace_back();  // one that is active
+  analysis.contacts[0].active.setConstant(2, true);
+  analysis.contacts[0].vertical_force.setZero(2);
+  analysis.contacts[0].wrench.setZero(6, 2);
+  analysis.contacts[0].friction_usage = analysis.contacts[0].cop_margin = VectorXd::Zero(2);
   MotionVerdict verdict = {};
-  for (MotionFinding& finding : verdict.findings) finding.measured.setZero(2);
+  verdict.unsure.setConstant(2, false);
   BOOST_TEST(
       close(summarizeMotion(robot, motion, analysis, verdict).mean_residual, Vector6::Ones()));
 }
@@ -135,7 +142,9 @@ BOOST_AUTO_TEST_CASE(contacts_have_their_own) {
   MotionAnalysis::Contact& contact = some.analysis.contacts[1];
   contact.active << false, true, true, false;
   contact.vertical_force << 0., 60., 40., 0.;
-  contact.friction_usage << kNaN, 0.5, 0.9, kNaN;
+  contact.wrench.topRows<2>() << 0., 3., 0., 0.,  //
+      0., -4., 0., 0.;
+  contact.friction_usage << kNaN, 0.8, 0.9, kNaN;
   contact.cop_margin << kNaN, 0.03, kNaN, kNaN;
   ContactStatistics statistics = some.summarize().contacts.at(1);
   BOOST_TEST(statistics.name == "sole1");
@@ -144,6 +153,10 @@ BOOST_AUTO_TEST_CASE(contacts_have_their_own) {
   BOOST_TEST(close(statistics.weight_share_while_active, 50. / 98.1));
   BOOST_TEST(close(statistics.largest_vertical_force, 60. / 98.1));
   BOOST_TEST(statistics.largest_friction_usage == 0.9);
+  BOOST_TEST(close(statistics.largest_cone_usage, 1.));  // 5 instead of 4
+  const VectorXd usage = computeConeUsage(contact);
+  BOOST_TEST(std::isnan(usage[0]));
+  BOOST_TEST(usage[2] == 0.9);
   BOOST_TEST(statistics.least_cop_margin == 0.03);
 
   contact.active.setConstant(false);
@@ -154,6 +167,7 @@ BOOST_AUTO_TEST_CASE(contacts_have_their_own) {
   BOOST_TEST(statistics.active_share == 0.);
   BOOST_TEST(std::isnan(statistics.weight_share_while_active));
   BOOST_TEST(std::isnan(statistics.largest_friction_usage));
+  BOOST_TEST(std::isnan(statistics.largest_cone_usage));
   BOOST_TEST(std::isnan(statistics.least_cop_margin));
 }
 
@@ -171,7 +185,7 @@ BOOST_AUTO_TEST_CASE(what_does_not_belong_together_is_refused) {
   other.analysis.status.resize(3);
   BOOST_TEST(throws<std::invalid_argument>([&] { other.summarize(); }, {"analysis", "4", "3"}));
   other = some;
-  other.verdict.findings[std::size_t(MotionFault::ContactMissing)].measured.setZero(5);
+  other.verdict.unsure.setConstant(5, false);
   BOOST_TEST(throws<std::invalid_argument>([&] { other.summarize(); }, {"verdict", "4", "5"}));
   BOOST_CHECK_THROW(summarizeMotion(DynaCoM(), some.motion, some.analysis, some.verdict),
                     NotReadyError);

@@ -243,12 +243,12 @@ BOOST_AUTO_TEST_CASE(contacts_and_verdicts_are_the_same_whatever_the_number_of_t
       append(numbers, contact.height);
       append(numbers, contact.velocity);
     }
-    const RecordedMotion recorded{motion.time, motion.q};
+    // It was recorded as standing still: else all frames were near jumps.
+    const RecordedMotion recorded{motion.time, motion.q.col(0).replicate(1, motion.frames())};
     const MotionVerdict verdict =
         judgeMotion(robot, motion, recorded, contacts, VectorXd::Zero(4), analysis, {}, threads);
     for (const MotionFinding& finding : verdict.findings) append(numbers, finding.measured);
-    // It was looked for contacts that are missing.
-    BOOST_TEST(verdict[MotionFault::ContactMissing].frames > 50);
+    BOOST_TEST(verdict[MotionFault::CoPOutside].frames > 50);
     return numbers;
   };
   const Numbers serial = judge(1);

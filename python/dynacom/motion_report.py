@@ -364,8 +364,9 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
     clip, robot, found = report.clip, report.robot, report.examination
     derived, statistics = found.derived, found.statistics
     derivatives = _derivatives_text(clip, derived)
+    downward = list(_downward_texts(robot, found.verdict))
     notes = [
-        *_downward_texts(robot, found.verdict),
+        *downward,
         *clip.notes,
         derivatives,
         report._schedule_text,
@@ -375,7 +376,9 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
     residual = statistics.mean_residual.tolist()
     unexplained = {"share": 1.0 - solved, "force": residual[:3], "torque": residual[3:]}
     if solved < 1.0:
-        notes.append(_unexplained_text(unexplained, statistics.weight))
+        # Forces that would have to pull are no load.
+        least = np.inf if downward else _LOAD * statistics.weight
+        notes.append(_unexplained_text(unexplained, least))
     sensitivity = []
     if derived.cutoff > 0.0:
         sensitivity = [_residuals(entry) for entry in found.sensitivity]
@@ -441,13 +444,13 @@ def _derivatives_text(clip: Clip, derived: DerivedMotion) -> str:
     return f"Velocities and accelerations are computed from the positions, {how}: {reason}."
 
 
-def _unexplained_text(unexplained: dict[str, Any], weight: float) -> str:
+def _unexplained_text(unexplained: dict[str, Any], least: float) -> str:
     force, torque = unexplained["force"], unexplained["torque"]
     text = (
         f"In {unexplained['share']:.1%} of the frames the contacts cannot give what the motion "
         "takes."
     )
-    if max(np.linalg.norm(force), np.linalg.norm(torque)) > _LOAD * weight:
+    if max(np.linalg.norm(force), np.linalg.norm(torque)) > least:
         force, torque = (", ".join(f"{value:.3g}" for value in part) for part in (force, torque))
         text += (
             f" Where a contact is active, ({force}) N and ({torque}) N m are missing on average, "

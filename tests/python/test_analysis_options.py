@@ -61,7 +61,7 @@ detection: {height: 0.02, ground_height: -0.1}
 verdict:
   residual_force: {limit: 2e-1, allowed_share: 0.5}
   foot_sliding: {limit: 1}
-  near_ground: 0.08
+  cop_force: 0.08
 """)
     options.update_from_file(path)
     assert changes(options) == {
@@ -72,7 +72,7 @@ verdict:
         "verdict.residual_force.limit": 0.2,
         "verdict.residual_force.allowed_share": 0.5,
         "verdict.foot_sliding.limit": 1.0,
-        "verdict.near_ground": 0.08,
+        "verdict.cop_force": 0.08,
     }
     assert options.verdict.residual_force == FaultLimit(0.2, 0.5)
     assert options.detection.ground_height == -0.1
@@ -88,7 +88,7 @@ def test_an_empty_file_changes_nothing(options, tmp_path, text):
 
 def test_what_is_given_back_can_be_read(options, tmp_path):
     """The settings in summary.json are a settings file."""
-    options.update_from_texts(["cutoff=null", "omega=3", "verdict.quaternion.limit=0.5"])
+    options.update_from_texts(["cutoff=null", "omega=3", "verdict.cop_outside.limit=0.5"])
     path = tmp_path / "settings.yaml"
     for text in (json.dumps(options.to_dict(), allow_nan=False), yaml.safe_dump(options.to_dict())):
         path.write_text(text)
@@ -132,8 +132,8 @@ def test_every_setting_can_be_set_by_a_text():
             "detection={height: 0.01, rest_speed: 1}",
             {"detection.height": 0.01, "detection.rest_speed": 1.0},
         ),
-        ("verdict.near_ground=0", {"verdict.near_ground": 0.0}),
-        ("verdict.discontinuity={limit: 1}", {"verdict.discontinuity.limit": 1.0}),
+        ("verdict.cop_force=0", {"verdict.cop_force": 0.0}),
+        ("verdict.discontinuity={limit: 2}", {"verdict.discontinuity.limit": 2.0}),
     ],
 )
 def test_texts(text, expected):
@@ -175,7 +175,7 @@ def test_the_last_counts(options):
         ("speed=3", ["setting 'speed=3'", "unknown setting 'speed'", "expected cutoff"]),
         ("detection.mu=3", ["detection: unknown setting 'mu'", "expected height, speed"]),
         ("verdict.feasible=3", ["verdict: unknown setting 'feasible'", "residual_force"]),
-        ("verdict.quaternion.share=3", ["quaternion: unknown", "expected limit, allowed_share"]),
+        ("verdict.cop_outside.share=3", ["cop_outside: unknown", "expected limit, allowed_share"]),
         ("cutoff=six", ["cutoff must be a finite number or null", "got 'six'"]),
         ("cutoff=[1", ["cutoff must be a finite number", "got '[1'"]),
         ("cutoff=.inf", ["cutoff must be a finite number", "got inf"]),
@@ -191,14 +191,14 @@ def test_the_last_counts(options):
         ("detection.height=-1", ["settings: DetectionSettings.height must be", "got -1"]),
         ("detection.height=1", ["settings: DetectionSettings.release_height must be", "got 0.03"]),
         ("detection.ground_height=.nan", ["ground_height must be a finite number or null", "nan"]),
-        ("verdict.quaternion=1", ["verdict: quaternion: must be a mapping with limit", "got 1"]),
-        ("verdict.quaternion.limit=-1", ["VerdictSettings.quaternion.limit must be", "got -1"]),
-        ("verdict.quaternion.allowed_share=2", ["allowed_share must be from 0 to 1", "got 2"]),
+        ("verdict.cop_outside=1", ["verdict: cop_outside: must be a mapping with limit", "got 1"]),
+        ("verdict.cop_outside.limit=-1", ["VerdictSettings.cop_outside.limit must be", "got -1"]),
+        ("verdict.cop_outside.allowed_share=2", ["allowed_share must be from 0 to 1", "got 2"]),
     ],
 )  # fmt: skip
 def test_errors_name_the_thing_and_change_nothing(options, text, parts):
     with pytest.raises(DynacomError) as caught:
-        options.update_from_texts(["omega=2", "verdict.near_ground=0.5", text])
+        options.update_from_texts(["omega=2", "verdict.cop_force=0.5", text])
     message = str(caught.value)
     assert "\n" not in message
     for part in parts:
@@ -241,7 +241,7 @@ def test_files_that_cannot_be_read(options, tmp_path):
         ("cutoff", np.nan, "cutoff must be finite and >= 0 Hz, or none, got nan"),
         ("omega", np.inf, "omega must be finite and >= 0 rad/s, got inf"),
         ("detection", None, "DetectionSettings.speed must be finite"),
-        ("verdict", None, "VerdictSettings.near_ground must be finite"),
+        ("verdict", None, "VerdictSettings.cop_force must be finite"),
     ],
 )
 def test_analyze_refuses_what_is_out_of_range(options, tmp_path, name, value, message):
@@ -249,7 +249,7 @@ def test_analyze_refuses_what_is_out_of_range(options, tmp_path, name, value, me
     if name == "detection":
         options.detection.speed = -1.0
     elif name == "verdict":
-        options.verdict.near_ground = -1.0
+        options.verdict.cop_force = -1.0
     else:
         setattr(options, name, value)
     for path in (WALKS / "talos_walk.npz", tmp_path / "none.npz"):

@@ -75,7 +75,7 @@ def objects(talos, talos_standing, talos_motion):
         report.clip,
         report,
         report.verdict,
-        report.verdict.findings["quaternion"],
+        report.verdict.findings["foot_sliding"],
         recorded,
         examiner,
         examination,

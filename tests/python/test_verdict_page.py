@@ -66,8 +66,8 @@ def test_limits(text):
         names(cell)[0]: {"limit": float(limit), "allowed_share": float(share)}
         for cell, _, limit, share, _ in table(text, "| code | unit")
     }
-    verdict = AnalysisOptions().to_dict()["verdict"]
-    del verdict["near_ground"]
+    settings = AnalysisOptions().to_dict()["verdict"]
+    verdict = {name: value for name, value in settings.items() if isinstance(value, dict)}
     assert documented == verdict
     assert list(documented) == list(verdict)
 
@@ -92,6 +92,9 @@ def test_the_summary_field_by_field(text, summary):
         assert set(value) <= set(names(rows[key])), key
 
 
+VERDICT = dynacom.VerdictSettings()
+
+
 def test_other_numbers(text):
     """Those in sentences."""
     words = " ".join(text.split())
@@ -101,6 +104,10 @@ def test_other_numbers(text):
     assert f"{AnalysisOptions().cutoff:g} Hz by default" in words
     assert dynacom.kEvenTimes == 0.1
     assert "up to a tenth of a frame away" in words
+    assert f"fewer than {dynacom.kMinimalFrames} frames tell nothing" in words
+    assert f"those of {VERDICT.minimal_window:g} s or more" in words
+    assert f"less than {VERDICT.interruption:g} s is overlooked" in words
+    assert f"vertical force is below {VERDICT.cop_force:g} m g" in words
 
 
 def test_examples(text, tmp_path):
