@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-2-Clause
+#include "acceleration_noise.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,11 +22,11 @@ constexpr double kStandardGravity = 9.81;
 // A difference of sixth order takes so many frames. Of higher orders, what a smooth motion leaves
 // is less, but there are more frames in which a contact may begin.
 constexpr Eigen::Index kNodes = 7;
-constexpr Eigen::Index kWindows = 4;  // that a block has, one frame after the other
+constexpr Eigen::Index kWindows = 10;  // that a block has, one frame after the other
 constexpr Eigen::Index kBlock = kNodes + kWindows - 1;
 
 // How many blocks are looked at: a part of those that there are, and no more than so many.
-constexpr Eigen::Index kLeastBlocks = 9, kMostBlocks = 64, kFramesPerBlock = 36;
+constexpr Eigen::Index kLeastBlocks = 6, kMostBlocks = 40, kFramesPerBlock = 58;
 
 // The lower quartile of |x|, where x is normal with mean 0 and deviation 1.
 constexpr double kQuartile = 0.318639;
@@ -73,13 +75,9 @@ Eigen::Vector3d measureWindow(const double* time, const Eigen::Vector3d* points)
 
 }  // namespace
 
-double estimateAccelerationNoise(const pinocchio::Model& model, const Eigen::VectorXd& time,
-                                 const Eigen::MatrixXd& q, Eigen::Index stride) {
-  internal::requireTime(time);
-  internal::requireConfigurations(model, q, time.size());
-  if (stride < 1) internal::throwInvalid("stride must be >= 1, got ", stride);
-
-  pinocchio::Data data(model);
+double internal::estimateAccelerationNoise(const pinocchio::Model& model, pinocchio::Data& data,
+                                           const Eigen::VectorXd& time, const Eigen::MatrixXd& q,
+                                           Eigen::Index stride) {
   std::array<std::vector<double>, 3> measured;
   std::array<double, kBlock> times;
   std::array<Eigen::Vector3d, kBlock> points;
@@ -105,6 +103,15 @@ double estimateAccelerationNoise(const pinocchio::Model& model, const Eigen::Vec
     square += *quartile * *quartile;
   }
   return std::sqrt(square) / kQuartile / kStandardGravity;
+}
+
+double estimateAccelerationNoise(const pinocchio::Model& model, const Eigen::VectorXd& time,
+                                 const Eigen::MatrixXd& q, Eigen::Index stride) {
+  internal::requireTime(time);
+  internal::requireConfigurations(model, q, time.size());
+  if (stride < 1) internal::throwInvalid("stride must be >= 1, got ", stride);
+  pinocchio::Data data(model);
+  return internal::estimateAccelerationNoise(model, data, time, q, stride);
 }
 
 }  // namespace dynacom

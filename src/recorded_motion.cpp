@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "acceleration_noise.hpp"
 #include "check.hpp"
 #include "dynacom/centroidal.hpp"
 #include "motion_check.hpp"
@@ -33,13 +34,17 @@ double largestStep(const Eigen::VectorXd& time) {
 }
 
 // Estimates the noise, and says which cut-off suits it.
-double chooseCutoff(const pinocchio::Model& model, const Eigen::VectorXd& time,
-                    const Eigen::MatrixXd& q, DerivedMotion& derived) {
+double chooseCutoff(const pinocchio::Model& model, pinocchio::Data& data,
+                    const Eigen::VectorXd& time, const Eigen::MatrixXd& q,
+                    DerivedMotion& derived) {
+  const auto estimate = [&](Eigen::Index stride) {
+    return internal::estimateAccelerationNoise(model, data, time, q, stride);
+  };
   const double rate = derived.frame_rate;
-  derived.noise = derived.thinned_noise = estimateAccelerationNoise(model, time, q);
+  derived.noise = derived.thinned_noise = estimate(1);
   if (rate >= 1.5 * kThinnedRate) {
     const auto stride = static_cast<Eigen::Index>(std::round(rate / kThinnedRate));
-    const double thinned = estimateAccelerationNoise(model, time, q, stride);
+    const double thinned = estimate(stride);
     if (!std::isnan(thinned)) derived.thinned_noise = thinned;
   }
   if (!(derived.thinned_noise <= kExactNoise))
@@ -49,15 +54,15 @@ double chooseCutoff(const pinocchio::Model& model, const Eigen::VectorXd& time,
 }
 
 // Marks the frames near one end, the first or the last, of a motion that was filtered.
-void markUnsure(const pinocchio::Model& model, bool is_first, DerivedMotion& derived) {
-  constexpr Eigen::Index kSamples = 8;
+void markUnsure(const pinocchio::Model& model, pinocchio::Data& data, bool is_first,
+                DerivedMotion& derived) {
+  constexpr Eigen::Index kSamples = 4;
   constexpr double kStandardGravity = 9.81;
   const Motion& motion = derived.motion;
   const Eigen::Index last = motion.frames() - 1;
   const auto periods = [&](double count) {
     return std::min(static_cast<Eigen::Index>(count * derived.frame_rate / derived.cutoff), last);
   };
-  pinocchio::Data data(model);
   double force = 0., torque = 0.;
   for (Eigen::Index sample = 0; sample < kSamples; ++sample) {
     const Eigen::Index away = sample * periods(1.) / (kSamples - 1);
@@ -95,8 +100,12 @@ DerivedMotion rederiveMotion(const pinocchio::Model& model, const RecordedMotion
   const bool is_even = !std::isnan(derived.frame_rate);
   const Eigen::VectorXd time = is_even ? makeEven(recorded.time) : recorded.time;
   derived.is_automatic = std::isnan(cutoff) && recorded.time.size() > 1;
+  internal::requireSize("q", recorded.q.rows(), Eigen::Index(model.nq), "components (nq)");
+  internal::requireSize("q", recorded.q.cols(), recorded.time.size(), "frames");
+  std::optional<pinocchio::Data> data;
+  if (derived.is_automatic || cutoff > 0.) data.emplace(model);
   if (std::isnan(cutoff))
-    cutoff = derived.is_automatic ? chooseCutoff(model, time, recorded.q, derived) : 0.;
+    cutoff = derived.is_automatic ? chooseCutoff(model, *data, time, recorded.q, derived) : 0.;
   if (!(cutoff >= 0.) || !std::isfinite(cutoff))
     throwInvalid("cutoff must be finite and >= 0 Hz, got ", cutoff);
   if (cutoff > 0. && recorded.time.size() > 1) {
@@ -114,7 +123,7 @@ DerivedMotion rederiveMotion(const pinocchio::Model& model, const RecordedMotion
   derived.motion.time = recorded.time;
   derived.unsure.setConstant(recorded.time.size(), false);
   if (derived.cutoff > 0.)
-    for (const bool is_first : {true, false}) markUnsure(model, is_first, derived);
+    for (const bool is_first : {true, false}) markUnsure(model, *data, is_first, derived);
   if (is_even) derived.time_error = (recorded.time - time).cwiseAbs().maxCoeff();
   return derived;
 }

@@ -3,7 +3,7 @@
 
 A settings file is YAML; what it does not name stays at its default::
 
-    cutoff: 6.0           # of the filter [Hz]; 0 or null for none
+    cutoff: auto          # of the filter [Hz]: what suits the motion; 0 or null for none
     omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
     flat: true            # the ground is flat and horizontal: see the CoP
     detection:            # DetectionSettings, field by field
@@ -18,21 +18,30 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from dynacom.dynacom_pywrap import DetectionSettings, FaultLimit, VerdictSettings
+from dynacom.dynacom_pywrap import (
+    DetectionSettings,
+    FaultLimit,
+    VerdictSettings,
+    kAutomaticCutoff,
+)
 from dynacom.errors import DynacomError
 from dynacom.yaml_file import is_number, parse_yaml, read_yaml
+
+#: What a cut-off is called that suits the motion.
+AUTO = "auto"
 
 
 @dataclass(slots=True)
 class AnalysisOptions:
     """How a motion is analysed."""
 
-    #: Of the filter where velocities and accelerations are computed [Hz]; 0 or None for no filter.
-    cutoff: float | None = 6.0
+    #: Of the filter where velocities and accelerations are computed [Hz]; 0 or None for no filter,
+    #: "auto" for what suits the motion, see ``deriveMotion``.
+    cutoff: float | Literal["auto"] | None = AUTO
     #: Of virtual repellent point and divergent component of motion [rad/s]; 0 stands for
     #: sqrt(g / mean height of the CoM above the ground).
     omega: float = 0.0
@@ -43,8 +52,12 @@ class AnalysisOptions:
 
     def validate(self) -> None:
         """Raises ValueError, naming the first setting out of its range."""
-        if self.cutoff is not None and not (math.isfinite(self.cutoff) and self.cutoff >= 0.0):
-            raise ValueError(f"cutoff must be finite and >= 0 Hz, or none, got {self.cutoff:g}")
+        cutoff = self.cutoff
+        if isinstance(cutoff, str):
+            if cutoff != AUTO:
+                raise ValueError(f"cutoff must be a number of Hz, {AUTO} or none, got {cutoff!r}")
+        elif cutoff is not None and not (math.isfinite(cutoff) and cutoff >= 0.0):
+            raise ValueError(f"cutoff must be finite and >= 0 Hz, {AUTO} or none, got {cutoff:g}")
         if not (math.isfinite(self.omega) and self.omega >= 0.0):
             raise ValueError(f"omega must be finite and >= 0 rad/s, got {self.omega:g}")
         self.detection.validate()
@@ -103,6 +116,11 @@ class AnalysisOptions:
         for name in _names(self):
             setattr(self, name, getattr(changed, name))
 
+    @property
+    def cutoff_number(self) -> float:
+        """The cut-off as ``deriveMotion`` and ``MotionExaminer`` take it: 0 for none [Hz]."""
+        return kAutomaticCutoff if self.cutoff == AUTO else self.cutoff or 0.0
+
     def to_dict(self) -> dict[str, Any]:
         """The settings, as a settings file would hold them."""
         return _to_dict(self)
@@ -134,6 +152,8 @@ def _without_nan(value: Any) -> Any:
 
 # What null stands for, where it may.
 _NULL = {"cutoff": None, "ground_height": math.nan, "ground_velocity": np.full(3, math.nan)}
+# What may be found by itself.
+_AUTO = {"cutoff"}
 
 
 def _update(group: Any, values: Any, where: str) -> None:
@@ -161,6 +181,12 @@ def _update(group: Any, values: Any, where: str) -> None:
             setattr(group, name, np.array(value, dtype=float))
         elif is_number(value):
             setattr(group, name, float(value))
+        elif value == AUTO and name in _AUTO:
+            setattr(group, name, AUTO)
         else:
-            expected = "a finite number or null" if name in _NULL else "a finite number"
+            expected = "a finite number"
+            if others := [
+                word for word, known in ((AUTO, _AUTO), ("null", _NULL)) if name in known
+            ]:
+                expected = f"{', '.join([expected, *others[:-1]])} or {others[-1]}"
             raise DynacomError(f"{where}: {name} must be {expected}, got {value!r}")

@@ -125,11 +125,11 @@ _Schedule = Annotated[
     typer.Option(metavar="FILE.yaml", help="When contacts are active, such as schedule.yaml."),
 ]
 _Cutoff = Annotated[
-    float | None,
+    str | None,
     typer.Option(
-        metavar="HZ",
-        help="Cut-off of the filter where velocities and accelerations are computed; 6 by "
-        "default, 0 for no filter.",
+        metavar="HZ|auto",
+        help="Cut-off of the filter where velocities and accelerations are computed; 0 for no "
+        "filter. By itself: none for exact motions, 6 for others, less at low frame rates.",
     ),
 ]
 _Ground = Annotated[
@@ -417,7 +417,7 @@ def _load_robot(
 def _make_options(
     file: Path | None,
     texts: list[str] | None,
-    cutoff: float | None,
+    cutoff: str | None,
     ground_height: float | None,
     ground_velocity: str | None,
     flat: bool | None,
@@ -427,7 +427,7 @@ def _make_options(
     if file is not None:
         options.update_from_file(file)
     options.update_from_texts(texts or [])
-    values = {"cutoff": cutoff, "flat": flat, "omega": omega}
+    values = {"cutoff": _parse_cutoff(cutoff), "flat": flat, "omega": omega}
     given = {name: value for name, value in values.items() if value is not None}
     ground = {}
     if ground_height is not None:
@@ -443,6 +443,17 @@ def _make_options(
         given["detection"] = ground
     options.update(given, "options")
     return options
+
+
+def _parse_cutoff(text: str | None) -> float | str | None:
+    if text is None or text == dynacom.analysis_options.AUTO:
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(
+            f"'{text}' is neither a number nor auto.", param_hint="'--cutoff'"
+        ) from None
 
 
 @contextmanager

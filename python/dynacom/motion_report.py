@@ -26,6 +26,9 @@ from dynacom.dynacom_pywrap import (
     compareMeasured,
     computeConeUsage,
     describeFaults,
+    kExactNoise,
+    kMeasuredCutoff,
+    kThinnedRate,
 )
 from dynacom.errors import DynacomError
 from dynacom.motion_file import Clip, read_motion
@@ -312,7 +315,7 @@ def make_examiner(
     """What examines motions of a robot; `others` are arguments of :class:`MotionExaminer`."""
     return MotionExaminer(
         robot.dynacom(),
-        options.cutoff or 0.0,
+        options.cutoff_number,
         options.flat,
         options.omega,
         options.detection,
@@ -441,7 +444,37 @@ def _derivatives_text(clip: Clip, derived: DerivedMotion) -> str:
         )
     if derived.time_error > 1e-6:
         how += f", with times made even, by up to {1e3 * derived.time_error:.2g} ms"
-    return f"Velocities and accelerations are computed from the positions, {how}: {reason}."
+    text = f"Velocities and accelerations are computed from the positions, {how}: {reason}."
+    if derived.is_automatic:
+        text += f" {_cutoff_text(derived)}"
+    if unsure := int(np.count_nonzero(derived.unsure)):
+        text += (
+            f" Those of {unsure} frames are unsure: the clip begins or ends in motion, and what "
+            "was before or came after is not known."
+        )
+    return text
+
+
+def _cutoff_text(derived: DerivedMotion) -> str:
+    """Why the cut-off is what it is."""
+    if np.isnan(derived.noise):
+        return f"There are too few frames to tell how noisy they are: {derived.cutoff:g} Hz."
+    noise = f"without a filter, the noise of the accelerations is {derived.noise:.2g} g"
+    limit = f"{kExactNoise:g} g"
+    if derived.cutoff == 0.0:
+        return f"The motion is exact: {noise}, up to {limit} are allowed."
+    thinned = f"{derived.thinned_noise:.2g} g at {kThinnedRate:g} frames a second"
+    if derived.thinned_noise <= kExactNoise:
+        return f"The motion is exact, but rounded: {noise}, but {thinned}."
+    if derived.noise <= kExactNoise:
+        noise += f", but {thinned}"
+    text = f"The cut-off was chosen because the motion is not exact: {noise}, more than {limit}."
+    if derived.cutoff < kMeasuredCutoff:
+        text += (
+            f" It is not {kMeasuredCutoff:g} Hz, because there are only "
+            f"{derived.frame_rate:.3g} frames a second."
+        )
+    return text
 
 
 def _unexplained_text(unexplained: dict[str, Any], least: float) -> str:
