@@ -90,6 +90,7 @@ class Bench:
         times, q, error = clip.time[:frames], clip.q[:frames], clip.quaternion_error[:frames]
         recorded = dynacom.RecordedMotion(times, q, error)
         robot, options, seconds = self.robot, self.job.options, Counter()
+        model, cutoff = robot.getModel(), options.cutoff_number
 
         def step(name, call, *arguments, **others):
             value, taken = timed(call, *arguments, **others)

@@ -173,9 +173,9 @@ struct Section {
 // with noise of 0 to 1 mm.
 constexpr double kEndPeriods = 0.5, kEndPart = 0.75;
 constexpr Eigen::Index kLeastEndSteps = 4;
-// After so many periods there is no more acceleration: nothing of it would be felt inside, and what
-// turns must not turn by half a turn from frame to frame.
-constexpr double kAcceleratedPeriods = 1.;
+// After so many periods there is no more acceleration: little of it would be felt inside, and what
+// turns must not turn by half a turn while the filter lags behind.
+constexpr double kAcceleratedPeriods = 0.5;
 
 // Weights of as many steps, from one frame to the next: their sum is the acceleration of the
 // parabola that fits the frames best, per frame², times kEndPart.

@@ -209,7 +209,7 @@ BOOST_AUTO_TEST_CASE(accelerations_of_a_clip_that_is_cut_in_motion) {
         all += std::pow(sine.acceleration(0.), 2);
       }
     }
-    BOOST_TEST(std::sqrt(at_ends / all) < 0.35);
+    BOOST_TEST(std::sqrt(at_ends / all) < 0.4);
     BOOST_TEST(std::sqrt(within / all) < 0.06);
   }
 }

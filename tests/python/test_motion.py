@@ -66,8 +66,8 @@ def continued(values: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
         return reflected
     flat = values.reshape(len(values), -1)[-1 - fitted :]
     acceleration = 0.75 * 2.0 * np.polyfit(np.arange(-fitted, 1), flat, 2)[0]
-    # Of a parabola and its reflection, and after a period of lines.
-    bent = np.minimum(after, math.ceil(period))
+    # Of a parabola and its reflection, and after half a period of lines.
+    bent = np.minimum(after, math.ceil(0.5 * period))
     grows = bent**2 + (2 * bent + 1) * (after - bent)
     return reflected + (grows[:, None] * acceleration).reshape(reflected.shape)
 
@@ -107,7 +107,7 @@ def test_only_the_cut_off_over_the_rate_matters(model, rate):
 @pytest.mark.parametrize("frames", [40, 300])
 def test_turning_about_an_axis_is_filtered_like_a_number(model, frames):
     """Beyond half a turn, and more than one: an angle is followed, whatever its quaternion."""
-    angle = 0.2 * noise(frames, 1, seed=3)[:, 0] + 0.15 * np.arange(frames)
+    angle = 0.05 * noise(frames, 1, seed=3)[:, 0] + 0.15 * np.arange(frames)
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
     q = configurations(frames)
     q[:, 3:7] = quaternions([pin.exp3(value * axis) for value in angle])

@@ -98,7 +98,13 @@ def test_other_numbers(text):
     assert f"off by at most {100 * dynacom.kVelocityMismatch:g} %" in words
     assert f"the accelerations by at most {100 * dynacom.kAccelerationMismatch:g} %" in words
     assert f"below {dynacom.kMaximalCutoff:g} of the frame rate" in words
-    assert f"{AnalysisOptions().cutoff:g} Hz by default" in words
+    assert f"up to {dynacom.kExactNoise:g} g it is" in words
+    part, thinned = dynacom.kMeasuredCutoffPart, dynacom.kThinnedRate
+    assert f"{dynacom.kMeasuredCutoff:g} Hz, or {part:g} of the frame rate if" in words
+    assert f"at {thinned:g} frames a second" in words
+    assert f"{dynacom.kRoundedCutoff:g} Hz: the motion is exact, but was rounded" in words
+    force, torque = dynacom.kUnsureForce, dynacom.kUnsureTorque
+    assert f"more than {force:g} m g or {torque:g} m g m beyond its weight" in words
     assert dynacom.kEvenTimes == 0.1
     assert "up to a tenth of a frame away" in words
 
