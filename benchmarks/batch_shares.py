@@ -98,9 +98,7 @@ class Bench:
             return value
 
         deriving, placing, distributing, judging = EXAMINATION
-        derived = step(
-            deriving, dynacom.deriveMotion, robot.getModel(), recorded, options.cutoff_number
-        )
+        derived = step(deriving, dynacom.deriveMotion, model, recorded, cutoff)
         motion = derived.motion
         contacts = step(placing, dynacom.computeContactMotions, robot, motion, threads=1)
         found = contacts, times
