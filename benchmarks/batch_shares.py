@@ -90,6 +90,7 @@ class Bench:
         times, q, error = clip.time[:frames], clip.q[:frames], clip.quaternion_error[:frames]
         recorded = dynacom.RecordedMotion(times, q, error)
         robot, options, seconds = self.robot, self.job.options, Counter()
+        model, cutoff = robot.getModel(), options.cutoff_number
 
         def step(name, call, *arguments, **others):
             value, taken = timed(call, *arguments, **others)
@@ -97,7 +98,7 @@ class Bench:
             return value
 
         deriving, placing, distributing, judging = EXAMINATION
-        derived = step(deriving, dynacom.deriveMotion, robot.getModel(), recorded, options.cutoff_number)
+        derived = step(deriving, dynacom.deriveMotion, model, recorded, cutoff)
         motion = derived.motion
         contacts = step(placing, dynacom.computeContactMotions, robot, motion, threads=1)
         found = contacts, times

@@ -138,7 +138,8 @@ void exposeRecordedMotion() {
           "filter if that is 0. If it is kAutomaticCutoff, which is NaN, exact motions are not\n"
           "filtered, those that are so at kThinnedRate only at kRoundedCutoff, and all others at\n"
           "kMeasuredCutoff, or kMeasuredCutoffPart of the frame rate if that is lower: a motion\n"
-          "is exact up to kExactNoise of its accelerations. Raises ValueError as Motion.validate, and if frames are to be\n"
+          "is exact up to kExactNoise of its accelerations. Raises ValueError as Motion.validate, "
+          "and if frames are to be\n"
           "filtered that are not evenly spaced, or with a cut-off that is out of range.");
   bp::def("rederiveMotion", &rederive,
           (bp::arg("model"), bp::arg("recorded"), bp::arg("cutoff") = kAutomaticCutoff),

@@ -35,8 +35,7 @@ double largestStep(const Eigen::VectorXd& time) {
 
 // Estimates the noise, and says which cut-off suits it.
 double chooseCutoff(const pinocchio::Model& model, pinocchio::Data& data,
-                    const Eigen::VectorXd& time, const Eigen::MatrixXd& q,
-                    DerivedMotion& derived) {
+                    const Eigen::VectorXd& time, const Eigen::MatrixXd& q, DerivedMotion& derived) {
   const auto estimate = [&](Eigen::Index stride) {
     return internal::estimateAccelerationNoise(model, data, time, q, stride);
   };

@@ -29,6 +29,33 @@ pinocchio::Model spinner() {
   return model;
 }
 
+/// Sines of a joint and along x of the root, whose accelerations are known.
+struct Sine {
+  double frequency, phase, size;
+
+  double at(double t) const { return size * std::sin(2. * kPi * frequency * t + phase); }
+  double acceleration(double t) const { return -std::pow(2. * kPi * frequency, 2) * at(t); }
+  MatrixXd configurations(const pinocchio::Model& model, const VectorXd& time) const {
+    MatrixXd q = restState(model).q.replicate(1, time.size());
+    for (Index frame = 0; frame < time.size(); ++frame) q(0, frame) = q(7, frame) = at(time[frame]);
+    return q;
+  }
+};
+
+VectorXd evenTimes(double rate, Index frames) {
+  return VectorXd::LinSpaced(frames, 0., double(frames - 1) / rate);
+}
+
+/// Positions of a body whose accelerations' noise has a deviation of 1 g, at that rate.
+MatrixXd noisyPositions(const pinocchio::Model& model, double rate, Index frames, Random& random) {
+  const double deviation = 9.81 / (std::sqrt(6.) * rate * rate) / std::sqrt(3.);
+  MatrixXd q = restState(model).q.replicate(1, frames);
+  for (Index frame = 0; frame < frames; ++frame)
+    for (Index axis = 0; axis < 3; ++axis)  // twelve uniform numbers are nearly normal
+      for (int k = 0; k < 12; ++k) q(axis, frame) += deviation * random.uniform(-0.5, 0.5);
+  return q;
+}
+
 /// Of a free-flyer's configuration.
 SE3 placementOf(const Eigen::Ref<const VectorXd>& q) {
   return SE3(Eigen::Quaterniond(q[6], q[3], q[4], q[5]).toRotationMatrix(), q.head<3>());
@@ -56,6 +83,20 @@ BOOST_AUTO_TEST_CASE(parabolas_have_their_own_derivatives) {
       BOOST_TEST(close(motion.q.col(frame), x.q));
       BOOST_TEST(close(motion.time, time, 0.));
     }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(polynomials_of_third_order_have_their_own_derivatives_at_both_ends) {
+  const auto model = spinner();
+  VectorXd time(5);
+  time << 0., 0.1, 0.25, 0.3, 0.42;
+  MatrixXd q = restState(model).q.replicate(1, 5);
+  q.row(7) = 1. + 2. * time.array() - 3. * time.array().square() + 4. * time.array().cube();
+  const Motion motion = differentiate(model, time, q);
+  for (const Index frame : {0, 4}) {
+    const double t = time[frame];
+    BOOST_TEST(close(motion.v(6, frame), 2. - 6. * t + 12. * t * t, 1e-10));
+    BOOST_TEST(close(motion.a(6, frame), -6. + 24. * t, 1e-9));
   }
 }
 
@@ -145,6 +186,111 @@ BOOST_AUTO_TEST_CASE(the_filter_halves_its_cut_off_and_delays_nothing) {
       BOOST_TEST(close(gain(f, cutoff), 1. / (1. + std::pow(ratio, 8.)), 1e-6));
     }
   }
+}
+
+BOOST_AUTO_TEST_CASE(accelerations_of_a_clip_that_is_cut_in_motion) {
+  // Over all phases of a sine of 1 Hz, parts of the root mean square of the true accelerations. A
+  // point reflection has no acceleration at the ends: it is off by all of them.
+  const auto model = spinner();
+  for (const double rate : {60., 120., 500.}) {
+    double at_ends = 0., within = 0., all = 0.;
+    const auto half_period = static_cast<Index>(0.5 * rate / 6.) + 1;
+    for (int k = 0; k < 24; ++k) {
+      const Sine sine{1., 2. * kPi * k / 24., 0.05};
+      const VectorXd time = evenTimes(rate, static_cast<Index>(rate));
+      const Motion motion = differentiate(
+          model, time, filterConfigurations(model, sine.configurations(model, time), rate, 6.));
+      for (const Index row : {0, 6}) {
+        const auto error = [&](Index frame) {
+          return std::pow(motion.a(row, frame) - sine.acceleration(time[frame]), 2);
+        };
+        at_ends += 0.5 * (error(0) + error(time.size() - 1));
+        within += 0.5 * (error(half_period) + error(time.size() - 1 - half_period));
+        all += std::pow(sine.acceleration(0.), 2);
+      }
+    }
+    BOOST_TEST(std::sqrt(at_ends / all) < 0.4);
+    BOOST_TEST(std::sqrt(within / all) < 0.06);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(ends_are_continued_in_every_direction_alike) {
+  // As much by a joint as by the root's place and, about an axis, its orientation.
+  const auto model = spinner();
+  const VectorXd time = evenTimes(60., 45);
+  const Sine sine{1.3, 0.7, 0.4};
+  MatrixXd q = sine.configurations(model, time);
+  for (Index frame = 0; frame < time.size(); ++frame)
+    q.col(frame).segment<4>(3) =
+        Eigen::Quaterniond(Eigen::AngleAxisd(sine.at(time[frame]), Vector3d(0.6, 0., 0.8)))
+            .coeffs();
+  const MatrixXd filtered = filterConfigurations(model, q, 60., 5.);
+  BOOST_TEST((filtered - q).col(0).norm() > 1e-5);
+  BOOST_TEST(close(filtered.row(0), filtered.row(7)));
+  for (Index frame = 0; frame < time.size(); ++frame) {
+    const Eigen::AngleAxisd turn(Eigen::Quaterniond(filtered.col(frame).segment<4>(3)));
+    const double angle = turn.angle() * turn.axis().dot(Vector3d(0.6, 0., 0.8));
+    BOOST_TEST(close(angle, filtered(7, frame), 1e-9));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(noise_of_accelerations_is_measured) {
+  Random random(7);
+  const auto model = singleBody(1., {});
+  for (const double rate : {30., 120., 500.}) {
+    const Index frames = 2000;
+    const VectorXd time = evenTimes(rate, frames);
+    const MatrixXd noise = noisyPositions(model, rate, frames, random);
+    const double measured = estimateAccelerationNoise(model, time, noise);
+    BOOST_TEST(close(measured, 1., 0.25));
+    // Half the rate has a quarter of it.
+    BOOST_TEST(close(estimateAccelerationNoise(model, time, noise, 2), 0.25, 0.07));
+    // It is there in a motion as well as at rest, and not less because most of the clip stands
+    // still without any; nor because frames are not evenly spaced.
+    MatrixXd moving = noise;
+    moving.row(2) += (3. * time.array()).sin().matrix().transpose();
+    BOOST_TEST(close(estimateAccelerationNoise(model, time, moving), 1., 0.25));
+    MatrixXd standing = moving;
+    standing.leftCols(900).colwise() = VectorXd(moving.col(900));
+    standing.rightCols(900).colwise() = VectorXd(moving.col(1099));
+    BOOST_TEST(estimateAccelerationNoise(model, time, standing) > 0.5);
+    VectorXd uneven = time;
+    for (Index frame = 0; frame < frames; ++frame) uneven[frame] += random.uniform(0., 0.3) / rate;
+    BOOST_TEST(close(estimateAccelerationNoise(model, uneven, noise), 1., 0.4));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(smooth_motions_and_those_with_contacts_have_no_noise) {
+  const auto model = spinner();
+  for (const double rate : {30., 60., 120., 500.}) {
+    // A sine of 3 Hz and 6.5 m/s² with a 0.1 g that begins and ends twice a second.
+    const VectorXd time = evenTimes(rate, static_cast<Index>(4. * rate));
+    MatrixXd q = Sine{2., 0.3, 0.04}.configurations(model, time);
+    BOOST_TEST(estimateAccelerationNoise(model, time, q) < 0.005);
+    for (Index frame = 0; frame < time.size(); ++frame) {
+      const double t = std::fmod(time[frame], 1.);
+      const double push =
+          t < 0.5 ? 0.5 * t * t : 0.125 + 0.5 * (t - 0.5) - 0.5 * (t - 0.5) * (t - 0.5);
+      q(2, frame) += 0.981 * (0.25 * std::floor(time[frame]) + push);
+    }
+    BOOST_TEST(estimateAccelerationNoise(model, time, q) < 0.005);
+    // Uneven frames of the same.
+    VectorXd uneven = time;
+    for (Index frame = 0; frame < time.size(); ++frame)
+      uneven[frame] += 0.3 * std::sin(5. * double(frame)) / rate;
+    const MatrixXd other = Sine{2., 0.3, 0.04}.configurations(model, uneven);
+    BOOST_TEST(estimateAccelerationNoise(model, uneven, other) < 0.005);
+  }
+  const VectorXd time = evenTimes(100., 6);
+  const MatrixXd rest = restState(model).q.replicate(1, 20);
+  BOOST_TEST(std::isnan(estimateAccelerationNoise(model, time, rest.leftCols(6))));
+  BOOST_TEST(estimateAccelerationNoise(model, evenTimes(100., 7), rest.leftCols(7)) == 0.);
+  BOOST_TEST(
+      std::isnan(estimateAccelerationNoise(model, evenTimes(100., 12), rest.leftCols(12), 2)));
+  BOOST_TEST(throws<std::invalid_argument>(
+      [&] { estimateAccelerationNoise(model, evenTimes(100., 20), rest, 0); }, {"stride", "0"}));
+  BOOST_TEST(throws<std::invalid_argument>([&] { estimateAccelerationNoise(model, time, rest); },
+                                           {"q", "6", "20"}));
 }
 
 BOOST_AUTO_TEST_CASE(the_filter_knows_no_direction) {

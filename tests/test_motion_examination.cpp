@@ -128,6 +128,7 @@ BOOST_AUTO_TEST_CASE(other_cutoffs_are_tried_where_there_was_a_filter) {
   const Clips clips;
   RecordedMotion recorded = clips.make(2);
   ExaminationSettings settings;
+  settings.cutoff = 6.;
   settings.sensitivity = true;
   std::vector<double> told;
   settings.progress = [&](double part) { told.push_back(part); };
@@ -150,6 +151,12 @@ BOOST_AUTO_TEST_CASE(other_cutoffs_are_tried_where_there_was_a_filter) {
   BOOST_TEST(examineMotion(clips.robot, recorded, settings).sensitivity.size() == 1u);
   settings.cutoff = 0.;
   BOOST_TEST(examineMotion(clips.robot, recorded, settings).sensitivity.empty());
+  // By itself: the motion is a sine, and exact.
+  settings.cutoff = kAutomaticCutoff;
+  found = examineMotion(clips.robot, recorded, settings);
+  BOOST_TEST(found.derived.is_automatic);
+  BOOST_TEST(found.derived.cutoff == 0.);
+  BOOST_TEST(found.sensitivity.empty());
   BOOST_TEST(told.back() == 1.);
 }
 

@@ -32,10 +32,10 @@ constexpr double kMaximalCutoff = 0.4;
 ///
 /// Positions of free-flyers are filtered in the world, orientations and joints in the tangent space
 /// at the filter's last output, which slides along the motion: for joints that are numbers this is
-/// the ordinary filter. Beyond both ends, the motion is continued by its point reflection there, plus
-/// a constant acceleration: three quarters of that of the parabola that fits the last half period of
-/// the cut-off best. What the motion really did there, nobody knows: accelerations within half a
-/// period of an end can be as wrong as they are large.
+/// the ordinary filter. Beyond both ends, the motion is continued by its point reflection there,
+/// plus a constant acceleration: three quarters of that of the parabola that fits the last half
+/// period of the cut-off best. What the motion really did there, nobody knows: accelerations within
+/// half a period of an end can be as wrong as they are large.
 /// @param q       configurations, nq × frames
 /// @param rate    frames per second, evenly spaced [Hz]
 /// @param cutoff  0 < cutoff < kMaximalCutoff rate [Hz]
@@ -61,9 +61,9 @@ DYNACOM_EXPORT Motion differentiate(const pinocchio::Model& model, const Eigen::
 /// It is that of the difference of sixth order, which takes smooth motions away and leaves what is
 /// random from frame to frame: per axis, the lower quartile of |Δ⁶c| as that of a normal
 /// distribution with deviation √924 σ, then √6 ‖σ‖ / Δt². A quartile, because of three quarters of
-/// them a contact may begin or end. Frames need not be evenly spaced: divided differences are taken.
-/// They are a sample, up to 640, of where the configuration moves at least half as much as in the
-/// root mean square over the motion.
+/// them a contact may begin or end. Frames need not be evenly spaced: divided differences are
+/// taken. They are a sample, up to 640, of where the configuration moves at least half as much as
+/// in the root mean square over the motion.
 /// @param time    frames, strictly increasing [s]
 /// @param q       configurations, nq × frames
 /// @param stride  of the frames that are looked at, >= 1

@@ -67,7 +67,8 @@ struct DerivedMotion {
   /// Whether the cut-off, or that there is none, was chosen for the noise below.
   bool is_automatic;
   /// estimateAccelerationNoise() of all frames, and of as many as make about kThinnedRate, which is
-  /// the same where that is not lower; NaN where no cut-off had to be chosen, and of few frames [g].
+  /// the same where that is not lower; NaN where no cut-off had to be chosen, and of few frames
+  /// [g].
   double noise, thinned_noise;
   /// Whether a frame's accelerations hang on what was before the first frame or after the last one,
   /// which nobody knows: it was filtered, it is within half a period of the cut-off from that end,
@@ -78,8 +79,8 @@ struct DerivedMotion {
 /// The motion that was recorded, if its velocities and accelerations agree with its configurations;
 /// else that of the filtered configurations, see filterConfigurations() and differentiate().
 /// @param cutoff  of the filter [Hz]; 0 for none; kAutomaticCutoff for none where the motion is
-///                exact, kRoundedCutoff where it is so at kThinnedRate, and else kMeasuredCutoff, or
-///                kMeasuredCutoffPart of the frame rate where that is lower
+///                exact, kRoundedCutoff where it is so at kThinnedRate, and else kMeasuredCutoff,
+///                or kMeasuredCutoffPart of the frame rate where that is lower
 /// @throws std::invalid_argument as Motion::validate(); or if frames are to be filtered that are
 ///         not evenly spaced, or with a cut-off that filterConfigurations() does not take
 DYNACOM_EXPORT DerivedMotion deriveMotion(const pinocchio::Model& model,

@@ -446,14 +446,10 @@ def _make_options(
 
 
 def _parse_cutoff(text: str | None) -> float | str | None:
-    if text is None or text == dynacom.analysis_options.AUTO:
-        return text
     try:
-        return float(text)
+        return text if text is None else float(text)
     except ValueError:
-        raise typer.BadParameter(
-            f"'{text}' is neither a number nor auto.", param_hint="'--cutoff'"
-        ) from None
+        return text  # auto, or what the options refuse
 
 
 @contextmanager

@@ -41,7 +41,7 @@ def changes(options: AnalysisOptions) -> dict[str, object]:
 
 
 def test_defaults(options):
-    assert options.cutoff == 6.0
+    assert options.cutoff == "auto"
     assert options.omega == 0.0
     assert options.flat is True
     assert options.detection == DetectionSettings()
@@ -127,6 +127,8 @@ def test_every_setting_can_be_set_by_a_text():
     [
         ("cutoff=null", {"cutoff": None}),
         ("cutoff=1e-3", {"cutoff": 0.001}),
+        ("cutoff=0", {"cutoff": 0.0}),
+        ("cutoff=auto", {}),
         ("flat=no", {"flat": False}),
         (
             "detection={height: 0.01, rest_speed: 1}",
@@ -138,6 +140,16 @@ def test_every_setting_can_be_set_by_a_text():
 )
 def test_texts(text, expected):
     assert changes(from_text(text)) == expected
+
+
+def test_the_cut_off_as_a_number(options):
+    assert np.isnan(options.cutoff_number)
+    options.update_from_texts(["cutoff=7"])
+    assert options.cutoff_number == 7.0
+    options.update_from_texts(["cutoff=null"])
+    assert options.cutoff_number == 0.0
+    options.update_from_texts(["cutoff=auto"])
+    assert options.to_dict()["cutoff"] == "auto"
 
 
 def test_null_is_the_ground_that_is_estimated(options):
@@ -176,14 +188,15 @@ def test_the_last_counts(options):
         ("detection.mu=3", ["detection: unknown setting 'mu'", "expected height, speed"]),
         ("verdict.feasible=3", ["verdict: unknown setting 'feasible'", "residual_force"]),
         ("verdict.cop_outside.share=3", ["cop_outside: unknown", "expected limit, allowed_share"]),
-        ("cutoff=six", ["cutoff must be a finite number or null", "got 'six'"]),
+        ("cutoff=six", ["cutoff must be a finite number, auto or null", "got 'six'"]),
         ("cutoff=[1", ["cutoff must be a finite number", "got '[1'"]),
         ("cutoff=.inf", ["cutoff must be a finite number", "got inf"]),
         ("cutoff=2020-99-99", ["cutoff must be a finite number", "got '2020-99-99'"]),
         (f"cutoff=1{400 * '0'}", ["cutoff must be a finite number", "got 1000"]),
         ("cutoff.x=1", ["cutoff must be a finite number", "got {'x': 1}"]),
-        ("cutoff=-1", ["settings: cutoff must be finite and >= 0 Hz, or none, got -1"]),
+        ("cutoff=-1", ["settings: cutoff must be finite and >= 0 Hz, auto or none, got -1"]),
         ("omega=-1", ["settings: omega must be finite and >= 0 rad/s, got -1"]),
+        ("omega=auto", ["omega must be a finite number, got 'auto'"]),
         ("omega=null", ["omega must be a finite number", "got None"]),
         ("flat=1", ["flat must be true or false", "got 1"]),
         ("detection=3", ["detection: must be a mapping with height, speed", "got 3"]),
@@ -237,8 +250,9 @@ def test_files_that_cannot_be_read(options, tmp_path):
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("cutoff", -1.0, "cutoff must be finite and >= 0 Hz, or none, got -1"),
-        ("cutoff", np.nan, "cutoff must be finite and >= 0 Hz, or none, got nan"),
+        ("cutoff", -1.0, "cutoff must be finite and >= 0 Hz, auto or none, got -1"),
+        ("cutoff", np.nan, "cutoff must be finite and >= 0 Hz, auto or none, got nan"),
+        ("cutoff", "six", "cutoff must be a number of Hz, auto or none, got 'six'"),
         ("omega", np.inf, "omega must be finite and >= 0 rad/s, got inf"),
         ("detection", None, "DetectionSettings.speed must be finite"),
         ("verdict", None, "VerdictSettings.cop_force must be finite"),

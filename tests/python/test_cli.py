@@ -517,7 +517,8 @@ def test_files_that_are_none(refuses_clip, tmp_path):
     ("arguments", "parts"),
     [
         (["--cutoff", "24"], ["clip.csv", "cutoff must be > 0 and < 24 Hz", "0.4 of the frame"]),
-        (["--cutoff", "-1"], ["cutoff must be finite and >= 0 Hz, or none, got -1"]),
+        (["--cutoff", "-1"], ["cutoff must be finite and >= 0 Hz, auto or none, got -1"]),
+        (["--cutoff", "six"], ["cutoff must be a finite number, auto or null, got 'six'"]),
         (["--set", "cutoff=30"], ["clip.csv", "cutoff must be", "got 30 Hz"]),
         (["--set", "speed=3"], ["setting 'speed=3'", "unknown setting 'speed'", "cutoff, omega"]),
         (["--set", "omega"], ["setting must be NAME=VALUE, got 'omega'"]),

@@ -10,7 +10,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import signal
 
 import dynacom
-from dynacom import Motion, compareDerivatives, differentiate, filterConfigurations
+from dynacom import (
+    Motion,
+    compareDerivatives,
+    differentiate,
+    estimateAccelerationNoise,
+    filterConfigurations,
+)
 from helpers import documentation, random_configuration, random_pose, random_tree
 
 RATE = 100.0
@@ -50,11 +56,29 @@ def configurations(frames: int, seed: int = 0) -> np.ndarray:
     return np.hstack([values[:, :3], quaternions(rotations), values[:, 3:5]])
 
 
+def continued(values: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
+    """Frames after the last: point reflection, and 3/4 of the acceleration of half a period."""
+    period = rate / cutoff
+    after = np.arange(1, min(len(values) - 1, math.ceil(8.0 * period)) + 1)
+    fitted = min(max(math.ceil(0.5 * period), 4), len(values) - 1)
+    reflected = 2.0 * values[-1] - values[-1 - after]
+    if fitted < 4:
+        return reflected
+    flat = values.reshape(len(values), -1)[-1 - fitted :]
+    acceleration = 0.75 * 2.0 * np.polyfit(np.arange(-fitted, 1), flat, 2)[0]
+    # Of a parabola and its reflection, and after half a period of lines.
+    bent = np.minimum(after, math.ceil(0.5 * period))
+    grows = bent**2 + (2 * bent + 1) * (after - bent)
+    return reflected + (grows[:, None] * acceleration).reshape(reflected.shape)
+
+
 def butterworth(values: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
     """The same filter by scipy."""
     sections = signal.butter(4, cutoff, fs=rate, output="sos")
-    padding = min(len(values) - 1, math.ceil(8.0 * rate / cutoff))
-    return signal.sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=padding)
+    before, after = continued(values[::-1], rate, cutoff)[::-1], continued(values, rate, cutoff)
+    padded = np.concatenate([before, values, after])
+    filtered = signal.sosfiltfilt(sections, padded, axis=0, padtype=None)
+    return filtered[len(before) : len(before) + len(values)]
 
 
 # The filter.
@@ -83,7 +107,7 @@ def test_only_the_cut_off_over_the_rate_matters(model, rate):
 @pytest.mark.parametrize("frames", [40, 300])
 def test_turning_about_an_axis_is_filtered_like_a_number(model, frames):
     """Beyond half a turn, and more than one: an angle is followed, whatever its quaternion."""
-    angle = 0.2 * noise(frames, 1, seed=3)[:, 0] + 0.15 * np.arange(frames)
+    angle = 0.05 * noise(frames, 1, seed=3)[:, 0] + 0.15 * np.arange(frames)
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
     q = configurations(frames)
     q[:, 3:7] = quaternions([pin.exp3(value * axis) for value in angle])
@@ -201,6 +225,7 @@ def uneven_times(frames: int, seed: int) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(8))
 def test_a_parabola_through_neighbours(seed):
     """v s + a s² / 2 leads from a frame to both of its neighbours, at any times."""
+    # At the ends there are other frames on one side only: to three of them a third power leads.
     model = random_tree(seed)
     time = uneven_times(12, seed)
     q = np.array([random_configuration(model, seed)] * 12)
@@ -209,9 +234,15 @@ def test_a_parabola_through_neighbours(seed):
     motion = differentiate(model, time, q)
     assert_array_equal(motion.time, time)
     assert_array_equal(motion.q, q)
-    for frame in range(12):
-        others = {0: (1, 2), 11: (9, 10)}.get(frame, (frame - 1, frame + 1))
-        for other in others:
+    for frame, others in ((0, (1, 2, 3)), (11, (8, 9, 10))):
+        s = time[list(others)] - time[frame]
+        steps = np.array([pin.difference(model, q[frame], q[other]) for other in others])
+        left = steps - np.outer(s, motion.v[frame]) - np.outer(0.5 * s**2, motion.a[frame])
+        thirds = left / s[:, None] ** 3
+        size = max(1.0, np.abs(thirds).max())
+        assert_allclose(thirds, np.tile(thirds[0], (3, 1)), rtol=0, atol=1e-7 * size)
+    for frame in range(1, 11):
+        for other in (frame - 1, frame + 1):
             s = time[other] - time[frame]
             step = motion.v[frame] * s + 0.5 * motion.a[frame] * s**2
             size = max(1.0, np.abs(step).max())
@@ -290,6 +321,29 @@ def test_times_that_are_none(model):
     ):
         with pytest.raises(ValueError, match=f"^{message}$"):
             differentiate(model, np.array(time), q)
+
+
+# How noisy are they?
+
+
+def test_noise_of_accelerations(model):
+    """Of what is known: deviation sqrt(6) rate² sigma on each axis."""
+    model = pin.Model(model)
+    model.appendBodyToJoint(1, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    frames, rate, sigma = 3000, 100.0, 1e-4
+    time = np.arange(frames) / rate
+    q = np.tile(configurations(1)[0], (frames, 1))
+    q[:, 1] += np.sin(time)
+    assert estimateAccelerationNoise(model, time, q) < 1e-6
+    q[:, :3] += sigma * np.random.default_rng(0).standard_normal((frames, 3))
+    expected = np.sqrt(3.0) * np.sqrt(6.0) * rate**2 * sigma / 9.81
+    assert estimateAccelerationNoise(model, time, q) == pytest.approx(expected, rel=0.2)
+    slower = estimateAccelerationNoise(model, time, q, stride=5)
+    assert slower == pytest.approx(expected / 25.0, rel=0.3)
+    with pytest.raises(ValueError, match="stride must be >= 1, got 0"):
+        estimateAccelerationNoise(model, time, q, 0)
+    with pytest.raises(ValueError, match="q must have 9 frames, got 3000"):
+        estimateAccelerationNoise(model, time[:9], q)
 
 
 # Do derivatives fit?

@@ -60,7 +60,9 @@ def test_settings_reach_what_they_are_for(talos, recorded):
 
 def test_progress(talos, recorded):
     told = []
-    examiner = MotionExaminer(talos.dynacom(), sensitivity=True, progress=told.append, threads=1)
+    examiner = MotionExaminer(
+        talos.dynacom(), 6.0, sensitivity=True, progress=told.append, threads=1
+    )
     for _ in range(2):
         told.clear()
         examiner.examine(recorded)
@@ -77,7 +79,7 @@ def test_progress(talos, recorded):
 
 def test_other_threads_go_on_meanwhile(talos, recorded):
     """Python's lock is free while motions are examined."""
-    examiner = MotionExaminer(talos.dynacom(), sensitivity=True, threads=1)
+    examiner = MotionExaminer(talos.dynacom(), 6.0, sensitivity=True, threads=1)
     done = threading.Event()
 
     def work():

@@ -86,7 +86,7 @@ def bare(walk: Clip) -> Clip:
 
 @pytest.fixture(scope="module")
 def found(talos: Robot, bare: Clip) -> MotionReport:
-    return analyze(bare, talos)
+    return analyze(bare, talos, options=with_options(cutoff=6.0))
 
 
 def cut(clip: Clip, frames: int) -> Clip:
@@ -466,7 +466,7 @@ def test_own_derivatives_need_not_agree_to_rounding(talos, walk):
 )
 def test_else_they_are_computed(talos, walk, change, why):
     """And the report says so, and why."""
-    report = analyze(replace(walk, **change(walk)), talos)
+    report = analyze(replace(walk, **change(walk)), talos, options=with_options(cutoff=6.0))
     q = dynacom.filterConfigurations(talos.model, walk.q, 50.0, 6.0)
     expected = dynacom.differentiate(talos.model, walk.time, q)
     for name in ("q", "v", "a"):
@@ -480,6 +480,28 @@ def test_else_they_are_computed(talos, walk, change, why):
     assert "Butterworth" in text and "at 6 Hz" in text
     assert why in text
     assert text in report.summary["notes"]
+
+
+def test_the_cut_off_that_suits(talos, bare):
+    """A plan is exact; with a millimetre of noise it is not; and who says what is believed."""
+    report = analyze(bare, talos)
+    assert report.summary["cutoff"] is None
+    assert report.summary["cutoff_sensitivity"] == []
+    assert "The motion is exact" in report.summary["derivatives"]
+    assert_array_equal(report.motion.q, bare.q)
+    q = bare.q.copy()
+    q[:, :3] += 1e-3 * np.random.default_rng(0).standard_normal((len(q), 3))
+    noisy = replace(bare, q=q)
+    report = analyze(noisy, talos)
+    assert report.summary["cutoff"] == 6.0
+    assert [entry["cutoff"] for entry in report.summary["cutoff_sensitivity"]] == [3.0, 6.0, 12.0]
+    text = report.summary["derivatives"]
+    assert "the motion is not exact" in text and "more than 0.01 g" in text
+    # At 12.5 frames a second there is no room for 6 Hz.
+    slow = analyze(replace(cut(noisy, 80), time=bare.time[:80] * 4.0), talos)
+    assert slow.summary["cutoff"] == pytest.approx(0.3 * 12.5)
+    assert "only 12.5 frames a second" in slow.summary["derivatives"]
+    assert "Those of " in slow.summary["derivatives"]
 
 
 def test_no_filter(talos, bare):
@@ -541,7 +563,7 @@ def test_uneven_times(talos, bare):
         "filter (cutoff 0) they need not be"
     )
     with pytest.raises(DynacomError, match=re.escape(f"talos_walk.npz: {message}")):
-        analyze(uneven, talos)
+        analyze(uneven, talos, options=with_options(cutoff=6.0))
     report = analyze(uneven, talos, options=with_options(cutoff=None))
     expected = dynacom.differentiate(talos.model, time, bare.q)
     assert_array_equal(report.motion.a, expected.a)
@@ -733,7 +755,8 @@ def test_no_number_is_null(talos, walk, tmp_path):
 
 def test_the_schedule_written_gives_the_same_again(talos, bare, found, tmp_path):
     found.save(tmp_path, page=False)
-    again = analyze(bare, talos, schedule=tmp_path / "schedule.yaml")
+    options = with_options(cutoff=6.0)
+    again = analyze(bare, talos, schedule=tmp_path / "schedule.yaml", options=options)
     assert_same(again, found)
     assert again.verdict.feasible == found.verdict.feasible
     differs = {
@@ -828,7 +851,8 @@ def test_a_payload_is_carried(talos, walk, report):
 def test_progress(talos, bare, walk):
     for clip in (bare, walk):
         parts = []
-        analyze(clip, talos, threads=1, progress=parts.append)
+        options = with_options(cutoff=6.0)
+        analyze(clip, talos, options=options, threads=1, progress=parts.append)
         assert parts == sorted(parts)
         assert parts[0] > 0.0 and parts[-1] == 1.0
         # Each cut-off is as much work.

@@ -74,6 +74,100 @@ def test_frame_rates():
     assert np.abs(rounded - np.arange(31) / 30.0).max() * 30.0 < dynacom.kEvenTimes
 
 
+def bob(rate: float, seconds: float = 3.0) -> tuple[np.ndarray, np.ndarray]:
+    """A squat of 1 Hz, cut in motion at both ends: time, and height [m]."""
+    time = np.arange(int(seconds * rate)) / rate
+    return time, 0.04 * np.sin(2.0 * np.pi * time + 0.6)
+
+
+@pytest.mark.parametrize("rate", [30.0, 60.0, 120.0, 500.0])
+def test_the_cut_off_that_suits(model, rate):
+    time, height = bob(rate)
+    q = np.tile(pin.neutral(model), (len(time), 1))
+    q[:, 2] = height
+    expected = -((2.0 * np.pi) ** 2) * height
+    exact = deriveMotion(model, RecordedMotion(time, q))
+    assert exact.is_automatic and exact.cutoff == 0.0
+    assert exact.noise < dynacom.kExactNoise and exact.thinned_noise < dynacom.kExactNoise
+    assert exact.unsure.dtype == bool and exact.unsure.tolist() == [False] * len(time)
+    # A second difference takes (2 pi f / rate)² / 12 of a sine away; at the ends it is 11 of these.
+    bound = (2.0 * np.pi / rate) ** 2 * 1.6
+    assert_allclose(exact.motion.a[:, 2], expected, rtol=0, atol=bound + 1e-6)
+
+    q[:, :3] += 1e-3 * np.random.default_rng(0).standard_normal((len(time), 3))
+    noisy = deriveMotion(model, RecordedMotion(time, q), dynacom.kAutomaticCutoff)
+    assert noisy.is_automatic and noisy.cutoff == dynacom.kMeasuredCutoff
+    assert noisy.noise > dynacom.kExactNoise
+    # Frames that are not marked are no worse than those in the middle.
+    error = np.abs(noisy.motion.a[:, 2] - expected)
+    middle = error[len(time) // 3 : 2 * len(time) // 3]
+    assert noisy.unsure.sum() == 2 * (int(0.5 * rate / 6.0) + 1)
+    assert noisy.unsure[0] and noisy.unsure[-1]
+    assert np.sqrt(np.mean(error[~noisy.unsure] ** 2)) < 1.5 * np.sqrt(np.mean(middle**2))
+
+    believed = deriveMotion(model, RecordedMotion(time, q), 0.0)
+    assert not believed.is_automatic and believed.cutoff == 0.0
+    assert np.isnan(believed.noise) and not believed.unsure.any()
+
+
+def test_cut_bob(shared_data):
+    """A squat that is cut in motion: its fit by a sine of 1 Hz tells the accelerations."""
+    talos = dynacom.load_robot("talos")
+    clip = dynacom.read_motion(shared_data / "cases" / "cut_bob.npz", talos)
+    model = talos.dynacom().getModel()
+    data = model.createData()
+    height = np.array([pin.centerOfMass(model, data, q)[2] for q in clip.q])
+    angle = 2.0 * np.pi * clip.time
+    waves = np.stack([np.sin(angle), np.cos(angle), np.ones_like(angle)], axis=1)
+    fitted = np.linalg.lstsq(waves, height, rcond=None)[0]
+    assert_allclose(waves @ fitted, height, rtol=0, atol=1e-6)
+    expected = -((2.0 * np.pi) ** 2) * waves[:, :2] @ fitted[:2]
+    assert np.abs(expected[[0, -1]]).min() > 1.0
+
+    def errors(derived) -> np.ndarray:
+        motion = derived.motion
+        states = [
+            dynacom.computeCentroidalState(model, data, *frame)
+            for frame in zip(motion.q, motion.v, motion.a, strict=True)
+        ]
+        return np.abs([state.acom[2] for state in states] - expected)
+
+    recorded = RecordedMotion(clip.time, clip.q)
+    exact = deriveMotion(model, recorded)
+    assert exact.cutoff == 0.0
+    assert errors(exact).max() < 0.02
+    forced = deriveMotion(model, recorded, 6.0)
+    assert errors(forced)[~forced.unsure].max() < 0.1
+    assert forced.unsure.sum() == 18
+
+
+# What is exact: plans and simulations. All others were measured, or fitted to what was.
+MOTIONS = {
+    "forces/sim_walk.npz": ("forces/sim_biped.yaml", True),
+    "forces/sim_trot.npz": ("forces/sim_quadruped.yaml", True),
+    "forces/sim_jump.npz": ("forces/sim_biped.yaml", True),
+    "forces/s4_walk.npz": ("forces/s4.yaml", False),
+    "forces/s4_squats.npz": ("forces/s4.yaml", False),
+    "forces/hamner_run_2mps.npz": ("forces/hamner.yaml", False),
+    "forces/icub_com_sinusoid.npz": ("forces/icub.yaml", False),
+    "cases/hyq_jump.npz": ("cases/hyq.yaml", True),
+    "cases/slope3.npz": ("talos", True),
+    "B_HandsUp.npz": ("g1", False),
+    "clips/airkick_stand.pkl": ("g1", False),
+}
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_what_is_exact(shared_data, name):
+    where, exact = MOTIONS[name]
+    robot = dynacom.load_robot(shared_data / where if "/" in where else where)
+    clip = dynacom.read_motion(shared_data / name, robot, trust=name.endswith("pkl"))
+    derived = rederiveMotion(robot.dynacom().getModel(), RecordedMotion(clip.time, clip.q))
+    assert derived.cutoff == (0.0 if exact else 6.0)
+    # Neither is near the limit.
+    assert derived.thinned_noise < 0.005 if exact else derived.thinned_noise > 0.02
+
+
 def test_refused(model, fall):
     with pytest.raises(ValueError, match="cutoff must be > 0 and < 20 Hz"):
         deriveMotion(model, RecordedMotion(TIME, fall["q"]), 25.0)

@@ -21,7 +21,8 @@ def text(root) -> str:
 def summary(talos) -> dict:
     """Of a clip that has everything: planned forces, and a filter."""
     clip = dynacom.read_motion(WALKS / "talos_walk.npz", talos)
-    return dynacom.analyze(replace(clip, v=None, a=None), talos).summary
+    options = AnalysisOptions(cutoff=6.0)
+    return dynacom.analyze(replace(clip, v=None, a=None), talos, options=options).summary
 
 
 def table(text: str, header: str) -> list[list[str]]:
@@ -44,7 +45,7 @@ def names(cell: str) -> list[str]:
 def test_settings_and_their_defaults(text):
     """Each one once."""
     rows = table(text, "| setting | default")
-    values = {"": None, "true": True}
+    values = {"": None, "true": True, "auto": "auto"}
     documented = {
         names(cell)[0]: values[default] if default in values else float(default)
         for cell, default, _ in rows
@@ -101,7 +102,13 @@ def test_other_numbers(text):
     assert f"off by at most {100 * dynacom.kVelocityMismatch:g} %" in words
     assert f"the accelerations by at most {100 * dynacom.kAccelerationMismatch:g} %" in words
     assert f"below {dynacom.kMaximalCutoff:g} of the frame rate" in words
-    assert f"{AnalysisOptions().cutoff:g} Hz by default" in words
+    assert f"up to {dynacom.kExactNoise:g} g it is" in words
+    part, thinned = dynacom.kMeasuredCutoffPart, dynacom.kThinnedRate
+    assert f"{dynacom.kMeasuredCutoff:g} Hz, or {part:g} of the frame rate if" in words
+    assert f"at {thinned:g} frames a second" in words
+    assert f"{dynacom.kRoundedCutoff:g} Hz: the motion is exact, but was rounded" in words
+    force, torque = dynacom.kUnsureForce, dynacom.kUnsureTorque
+    assert f"more than {force:g} m g or {torque:g} m g m beyond its weight" in words
     assert dynacom.kEvenTimes == 0.1
     assert "up to a tenth of a frame away" in words
     assert f"fewer than {dynacom.kMinimalFrames} frames tell nothing" in words
