@@ -58,9 +58,7 @@ void exposeContactInference() {
       "described where C++ declares it, and docs/truth.md has what it was tried against.");
   for (const Settings::Constant& constant : Settings::constants()) {
     double Settings::*field = constant.second;
-    settings.add_property(
-        constant.first, bp::make_getter(field),
-        bp::make_setter(field));
+    settings.add_property(constant.first, bp::make_getter(field), bp::make_setter(field));
   }
   settings
       .def_readwrite("ground_height", &Settings::ground_height,
@@ -72,8 +70,8 @@ void exposeContactInference() {
 
   {
     const bp::scope split =
-        bp::class_<PartRobot>("PartRobot",
-                              "A robot whose contacts are points, see splitContacts.", bp::no_init)
+        bp::class_<PartRobot>("PartRobot", "A robot whose contacts are points, see splitContacts.",
+                              bp::no_init)
             .def_readonly("robot", &PartRobot::robot,
                           "A DynaCoM that knows each part as a ContactPoint")
             .add_property("parts", &getParts, "A PartRobot.Part for each of them")
@@ -116,10 +114,11 @@ void exposeContactInference() {
       .def(PrintVisitor<ContactInference>(&writeInference))
       .def(CopyVisitor<ContactInference>());
 
-  bp::def("splitContacts", &splitContacts, bp::arg("robot"),
-          "The PartRobot of a DynaCoM: a Contact6D becomes a point for each of its corners, called\n"
-          "front_left, front_right, rear_left and rear_right; a ContactPoint stays what it is.\n"
-          "Raises ValueError if a contact is of another kind, NotReadyError before initialize().");
+  bp::def(
+      "splitContacts", &splitContacts, bp::arg("robot"),
+      "The PartRobot of a DynaCoM: a Contact6D becomes a point for each of its corners, called\n"
+      "front_left, front_right, rear_left and rear_right; a ContactPoint stays what it is.\n"
+      "Raises ValueError if a contact is of another kind, NotReadyError before initialize().");
   bp::def("gatherParts", &gather,
           (bp::arg("robot"), bp::arg("parts"), bp::arg("contacts"), bp::arg("motions"),
            bp::arg("analysis")),

@@ -9,8 +9,7 @@ namespace {
 using Schedule = ContactSchedule;
 
 std::shared_ptr<Schedule> makeSchedule(const bp::object& names, const Schedule::Matrix& active,
-                                       const bp::object& confidence,
-                                       const bp::object& readiness) {
+                                       const bp::object& confidence, const bp::object& readiness) {
   auto schedule = std::make_shared<Schedule>();
   if (PyUnicode_Check(names.ptr())) {  // whose letters would be the names
     PyErr_SetString(PyExc_TypeError, "names must be several names, got one text");
@@ -18,8 +17,8 @@ std::shared_ptr<Schedule> makeSchedule(const bp::object& names, const Schedule::
   }
   schedule->names = toVectorOf<std::string>(names);
   schedule->active = active.transpose();
-  for (const auto& [given, matrix] : {std::pair(&confidence, &schedule->confidence),
-                                      std::pair(&readiness, &schedule->readiness)})
+  for (const auto& [given, matrix] :
+       {std::pair(&confidence, &schedule->confidence), std::pair(&readiness, &schedule->readiness)})
     if (!given->is_none()) *matrix = bp::extract<Eigen::MatrixXd>(*given)().transpose();
   return schedule;
 }
@@ -58,19 +57,20 @@ void exposeContactSchedule() {
   bp::class_<Schedule, std::shared_ptr<Schedule>>("ContactSchedule",
                                                   "Which contacts are active when.", bp::no_init)
       .def("__init__",
-           bp::make_constructor(&makeSchedule, bp::default_call_policies(),
-                                (bp::arg("names"), bp::arg("active"),
-                                 bp::arg("confidence") = bp::object(),
-                                 bp::arg("readiness") = bp::object())),
+           bp::make_constructor(
+               &makeSchedule, bp::default_call_policies(),
+               (bp::arg("names"), bp::arg("active"), bp::arg("confidence") = bp::object(),
+                bp::arg("readiness") = bp::object())),
            "names: C names; active: (T, C) of bool; confidence, readiness: (T, C), or None where\n"
            "nobody has said so.")
       .add_property("names", &getNames, "Names of the C contacts")
       .add_property("active", &Rows<&Schedule::active>::get, "(T, C) of bool")
       .add_property("confidence", &getConfidence,
                     "Probability that a contact is active, (T, C), or None")
-      .add_property("readiness", &getReadiness,
-                    "How readily a contact bears load while it is active, rho: weights are divided\n"
-                    "by its square root; (T, C), or None for 1")
+      .add_property(
+          "readiness", &getReadiness,
+          "How readily a contact bears load while it is active, rho: weights are divided\n"
+          "by its square root; (T, C), or None for 1")
       .def("validate", &Schedule::validate, (bp::arg("self"), bp::arg("frames")),
            "Raises ValueError if a name is there twice or a matrix is not (frames, C).")
       .def(PrintVisitor<Schedule>(&writeSchedule))

@@ -12,9 +12,7 @@ bp::list getContacts(const Examination& examination) { return toList(examination
 
 bp::list getParts(const Examination& examination) { return toList(examination.parts); }
 
-bp::list getPartMotions(const Examination& examination) {
-  return toList(examination.part_motions);
-}
+bp::list getPartMotions(const Examination& examination) { return toList(examination.part_motions); }
 
 bp::object getInferred(const Examination& examination) {
   return examination.inferred ? bp::object(*examination.inferred) : bp::object();

@@ -31,8 +31,8 @@ std::string addCornerFrame(pinocchio::Model& model, const pinocchio::Frame& surf
   while (model.existFrame(name)) name += '_';
   const pinocchio::SE3 offset(Eigen::Matrix3d::Identity(),
                               Eigen::Vector3d(corner.x(), corner.y(), 0.));
-  model.addFrame(pinocchio::Frame(name, surface.parentJoint, surface.placement * offset,
-                                  pinocchio::OP_FRAME));
+  model.addFrame(
+      pinocchio::Frame(name, surface.parentJoint, surface.placement * offset, pinocchio::OP_FRAME));
   return name;
 }
 
@@ -122,8 +122,7 @@ PartRobot splitContacts(const DynaCoM& robot) {
         const std::string name = names[k] + "." + nameCorner(corners.col(i));
         ContactPointSettings part;
         part.mu = surface->getSettings().mu;
-        part.weights =
-            std::sqrt(double(corners.cols())) * surface->getSettings().weights.head<3>();
+        part.weights = std::sqrt(double(corners.cols())) * surface->getSettings().weights.head<3>();
         part.world_aligned = true;
         part.frame_name = addCornerFrame(model, frame, name, corners.col(i));
         parts.push_back({name, k, 0});
@@ -182,8 +181,8 @@ MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
       // In the world, about the contact's origin.
       const Eigen::Vector3d force =
           findRotation(motions[k], frame) * part.wrench.col(frame).head<3>();
-      const Eigen::Vector3d lever = motions[k].position.col(frame) -
-                                    contacts[owner].position.col(frame);
+      const Eigen::Vector3d lever =
+          motions[k].position.col(frame) - contacts[owner].position.col(frame);
       wrenches[owner].head<3>() += force;
       wrenches[owner].tail<3>() += lever.cross(force);
     }

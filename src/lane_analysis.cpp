@@ -228,10 +228,10 @@ void LaneAnalysis::run(const Motion& motion, Eigen::Index first, Eigen::Index fr
     MotionAnalysis::Contact& contact = result.contacts[k];
     const double* own_readiness =
         readiness.size() > 0 ? readiness.col(static_cast<Eigen::Index>(k)).data() + first : nullptr;
-    rows_[k] = {number(contact.active),       own_readiness,
-                from(contact.wrench),         number(contact.vertical_force),
-                from(contact.cop),            number(contact.friction_usage),
-                number(contact.yaw_usage),    number(contact.cop_margin)};
+    rows_[k] = {number(contact.active),    own_readiness,
+                from(contact.wrench),      number(contact.vertical_force),
+                from(contact.cop),         number(contact.friction_usage),
+                number(contact.yaw_usage), number(contact.cop_margin)};
   }
   lanes::Frames described = {};
   described.count = frames;

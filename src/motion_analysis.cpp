@@ -140,7 +140,7 @@ class Analyst {
   std::shared_ptr<DynaCoM> worker_;
   std::vector<std::shared_ptr<ContactBase>> contacts_;
   std::vector<Eigen::VectorXd> weights_;  // of the contacts' forces, where these may change
-  bool is_cold_ = true;  // whether the worker has done nothing in this block
+  bool is_cold_ = true;                   // whether the worker has done nothing in this block
 };
 
 // What holds where nothing is active, and a pressure and its points have no meaning.
@@ -317,9 +317,8 @@ MotionAnalysis internal::analyzeMotion(Desks& desks, double ground_height, const
   MotionAnalysis result = makeStorage(names, motion, schedule);
   const Eigen::MatrixXd readiness = orderReadiness(names, motion.frames(), schedule);
   const auto makeWork = [&]() -> BlockWork {
-    const auto analyst =
-        std::make_shared<Analyst>(desks, ground_height, motion, schedule, readiness, settings,
-                                  result);
+    const auto analyst = std::make_shared<Analyst>(desks, ground_height, motion, schedule,
+                                                   readiness, settings, result);
     return [analyst](Eigen::Index first, Eigen::Index frames) { analyst->analyze(first, frames); };
   };
   try {

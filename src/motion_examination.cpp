@@ -135,8 +135,8 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
     none.active.resize(0, motion.frames());
     const MotionAnalysis dynamics = analyze(motion, none, robot.getGroundHeight());
     const DerivedMotion& derived = found.derived;
-    const bool exact = derived.cutoff == 0. ||
-                       (derived.is_automatic && derived.thinned_noise <= kExactNoise);
+    const bool exact =
+        derived.cutoff == 0. || (derived.is_automatic && derived.thinned_noise <= kExactNoise);
     const auto infer = [&](const ContactSchedule* schedule) {
       return inferContacts(parts, found.part_motions, dynamics, exact, settings.detection,
                            schedule);
@@ -178,12 +178,11 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
     CutoffSensitivity sensitivity = {};
     sensitivity.cutoff = cutoff;
     sensitivity.verdict = judge(other, motions, other_analysis);
-    sensitivity.statistics =
-        summarizeMotion(robot, other.motion,
-                        gatherParts(robot, parts,
-                                    internal::computeContactMotions(desks, other.motion, workers),
-                                    motions, other_analysis),
-                        sensitivity.verdict);
+    sensitivity.statistics = summarizeMotion(
+        robot, other.motion,
+        gatherParts(robot, parts, internal::computeContactMotions(desks, other.motion, workers),
+                    motions, other_analysis),
+        sensitivity.verdict);
     found.sensitivity.push_back(std::move(sensitivity));
   }
   return found;

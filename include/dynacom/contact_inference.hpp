@@ -12,10 +12,10 @@ namespace dynacom {
 
 /// A time in which a part of the robot is at rest: on the ground, or held in the air.
 struct Stance {
-  std::size_t part;           ///< index of PartRobot::parts
-  Eigen::Index first, behind; ///< frames
-  double height;              ///< of the part's lowest point there [m]
-  bool on_ground;             ///< whether the ground may carry the part there
+  std::size_t part;            ///< index of PartRobot::parts
+  Eigen::Index first, behind;  ///< frames
+  double height;               ///< of the part's lowest point there [m]
+  bool on_ground;              ///< whether the ground may carry the part there
 };
 
 /// When which part of a robot touches the ground, and where that ground is.
@@ -40,8 +40,8 @@ struct DYNACOM_EXPORT ContactInference {
 /// @param dynamics  of analyzeMotion() for the parts, with whatever schedule
 /// @param exact     whether the motion is free of noise: planned, or simulated
 /// @param recorded  of the whole robot's contacts, by whose names and numbers of parts: if given,
-///                  contacts are active as it says, and only which of their parts are is found; null
-///                  otherwise
+///                  contacts are active as it says, and only which of their parts are is found;
+///                  null otherwise
 /// @throws std::invalid_argument if settings are not valid, or sizes differ, or there are more than
 ///         32 parts
 DYNACOM_EXPORT ContactInference inferContacts(const PartRobot& parts,

@@ -15,7 +15,7 @@ struct DYNACOM_EXPORT PartRobot {
   struct Part {
     std::string name;     ///< of the contact, and for one of several parts `<contact>.<part>`
     std::size_t contact;  ///< whose part it is: an index of getKnownContacts() of the whole robot
-    int limb;             ///< parts on one joint, or on a joint that moves another's, share a number
+    int limb;  ///< parts on one joint, or on a joint that moves another's, share a number
   };
   std::vector<Part> parts;
 };

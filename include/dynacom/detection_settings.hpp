@@ -13,8 +13,8 @@
 namespace dynacom {
 
 /// The constants of inferContacts(), all in seconds, metres and parts of the weight m g: none is
-/// about frames. docs/truth.md has what each was tried against, and what becomes of the figures when
-/// it is 0.6 or 1.6 times as large.
+/// about frames. docs/truth.md has what each was tried against, and what becomes of the figures
+/// when it is 0.6 or 1.6 times as large.
 ///
 /// Costs are dimensionless: 1 is what a measure costs that is as large as its scale. Scales with a
 /// least and a greatest are taken from the motion itself, between these.
@@ -58,11 +58,11 @@ struct DYNACOM_EXPORT DetectionSettings {
   // Costs.
 
   /// What being in contact is worth, for a second: a point costs as much less.
-  double contact_gain = 9.;
+  double contact_gain = 10.;
   /// The greatest cost of heights and speeds in their own scales.
-  double fine_greatest = 12.;
+  double fine_greatest = 14.;
   /// The same in absolute scales, [m] and [m/s], with a factor, and the greatest cost.
-  double coarse_factor = 3., coarse_height = 0.05, coarse_speed = 0.7, coarse_greatest = 50.;
+  double coarse_factor = 3., coarse_height = 0.05, coarse_speed = 0.45, coarse_greatest = 50.;
   /// How far below its rest a point is pressed, and not sunk [m].
   double pressed_depth = 0.07;
   /// Of what contacts cannot give, in its own scales, the greatest cost; and of [m g] and [m g m],

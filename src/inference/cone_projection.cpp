@@ -27,7 +27,7 @@ ConeProjection::Vector6 ConeProjection::direction(const Edge& edge, const Eigen:
   const Eigen::Vector3d lever = levers.col(edge.point);
   Vector6 wrench;
   wrench << force, lever.cross(force) / lever_;
-  return wrench / wrench.norm();
+  return wrench;
 }
 
 // The factors of least squares, by Cholesky's decomposition of the normal equations; false if the
@@ -69,8 +69,7 @@ void ConeProjection::drop(int position) {
 
 ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
                                                  const Eigen::Matrix3Xd& levers,
-                                                 const std::vector<double>& mu,
-                                                 std::uint32_t set) {
+                                                 const std::vector<double>& mu, std::uint32_t set) {
   target_ << wrench.head<3>(), wrench.tail<3>() / lever_;
   const double size = target_.norm();
 
@@ -102,23 +101,19 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
     const Eigen::Vector3d force = residual.head<3>(), torque = residual.tail<3>() / lever_;
     Edge best = {-1, 0, 0};
     double slope = kGain * size;
-    Vector6 column = Vector6::Zero();
     for (std::uint32_t rest = set; rest != 0; rest &= rest - 1) {
       const int point = __builtin_ctz(rest);
       const Eigen::Vector3d pull = force + torque.cross(Eigen::Vector3d(levers.col(point)));
       const double friction = mu[static_cast<std::size_t>(point)];
-      if (friction * (std::abs(pull.x()) + std::abs(pull.y())) + pull.z() <= 0.) continue;
+      const double value = friction * (std::abs(pull.x()) + std::abs(pull.y())) + pull.z();
+      if (value <= slope) continue;
       const Edge edge = {point, pull.x() < 0. ? -1 : 1, pull.y() < 0. ? -1 : 1};
-      const Vector6 candidate = direction(edge, levers, mu);
-      const double value = candidate.dot(residual);
-      if (value > slope && std::find(edges_.begin(), edges_.begin() + count_, edge) ==
-                               edges_.begin() + count_) {
-        best = edge, slope = value, column = candidate;
-      }
+      const auto known = edges_.begin() + count_;
+      if (std::find(edges_.begin(), known, edge) == known) best = edge, slope = value;
     }
     if (best.point < 0 || count_ == kEdges) break;
     edges_[count_] = best;
-    columns_.col(count_) = column;
+    columns_.col(count_) = direction(best, levers, mu);
     factors_[count_] = 0.;
     ++count_;
     if (!solve()) {
@@ -131,8 +126,8 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
       int leaving = -1;
       for (int k = 0; k < count_; ++k) {
         if (solution_[k] > 0.) continue;
-        const double part = factors_[k] / std::max(factors_[k] - solution_[k],
-                                                   std::numeric_limits<double>::min());
+        const double part =
+            factors_[k] / std::max(factors_[k] - solution_[k], std::numeric_limits<double>::min());
         if (leaving < 0 || part < step) step = part, leaving = k;
       }
       if (leaving < 0) break;

@@ -31,7 +31,8 @@ class ConeProjection {
   /// @param levers    from that point to the points that may push
   /// @param mu        of each
   /// @param set       a bit for each point that pushes, of which there are at most 32
-  /// The edges that made up the last answer are tried first: consecutive frames have much in common.
+  /// The edges that made up the last answer are tried first: consecutive frames have much in
+  /// common.
   Residual project(const Vector6& wrench, const Eigen::Matrix3Xd& levers,
                    const std::vector<double>& mu, std::uint32_t set);
 

@@ -72,8 +72,7 @@ internal::KnownContacts findKnown(const PartRobot& parts, const ContactSchedule&
 
 ContactInference inferContacts(const PartRobot& parts, const std::vector<ContactMotion>& motions,
                                const MotionAnalysis& dynamics, bool exact,
-                               const DetectionSettings& settings,
-                               const ContactSchedule* recorded) {
+                               const DetectionSettings& settings, const ContactSchedule* recorded) {
   settings.validate();
   const Eigen::VectorXd& time = dynamics.time;
   const Index frames = time.size();
@@ -87,8 +86,8 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
   std::vector<internal::PointTrack> tracks;
   tracks.reserve(count);
   const auto addTrack = [&](std::size_t k, const Eigen::Matrix3Xd& velocity) {
-    const auto contact = std::dynamic_pointer_cast<const ContactPoint>(
-        parts.robot.getContact(parts.parts[k].name));
+    const auto contact =
+        std::dynamic_pointer_cast<const ContactPoint>(parts.robot.getContact(parts.parts[k].name));
     tracks.push_back({parts.parts[k].limb, contact ? contact->getSettings().mu : 0.,
                       motions[k].position, velocity});
   };

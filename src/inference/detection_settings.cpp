@@ -30,42 +30,42 @@ const char* nameOf(double DetectionSettings::*field) {
 
 const std::vector<DetectionSettings::Constant>& DetectionSettings::constants() {
   static const std::vector<Constant> all = {
-    {"rest_speed_part", &DetectionSettings::rest_speed_part},
-    {"rest_speed_least", &DetectionSettings::rest_speed_least},
-    {"rest_speed_greatest", &DetectionSettings::rest_speed_greatest},
-    {"exact_rest_speed_least", &DetectionSettings::exact_rest_speed_least},
-    {"exact_rest_speed_greatest", &DetectionSettings::exact_rest_speed_greatest},
-    {"moving_speed", &DetectionSettings::moving_speed},
-    {"horizontal_part", &DetectionSettings::horizontal_part},
-    {"rest_duration", &DetectionSettings::rest_duration},
-    {"same_rest", &DetectionSettings::same_rest},
-    {"landing_height", &DetectionSettings::landing_height},
-    {"same_ground", &DetectionSettings::same_ground},
-    {"exact_same_ground", &DetectionSettings::exact_same_ground},
-    {"height_scale_least", &DetectionSettings::height_scale_least},
-    {"height_scale_greatest", &DetectionSettings::height_scale_greatest},
-    {"speed_scale_part", &DetectionSettings::speed_scale_part},
-    {"speed_scale_least", &DetectionSettings::speed_scale_least},
-    {"speed_scale_greatest", &DetectionSettings::speed_scale_greatest},
-    {"force_scale_part", &DetectionSettings::force_scale_part},
-    {"force_scale_least", &DetectionSettings::force_scale_least},
-    {"force_scale_greatest", &DetectionSettings::force_scale_greatest},
-    {"lever", &DetectionSettings::lever},
-    {"contact_gain", &DetectionSettings::contact_gain},
-    {"fine_greatest", &DetectionSettings::fine_greatest},
-    {"coarse_factor", &DetectionSettings::coarse_factor},
-    {"coarse_height", &DetectionSettings::coarse_height},
-    {"coarse_speed", &DetectionSettings::coarse_speed},
-    {"coarse_greatest", &DetectionSettings::coarse_greatest},
-    {"pressed_depth", &DetectionSettings::pressed_depth},
-    {"missing_greatest", &DetectionSettings::missing_greatest},
-    {"missing_factor", &DetectionSettings::missing_factor},
-    {"missing_force", &DetectionSettings::missing_force},
-    {"missing_torque", &DetectionSettings::missing_torque},
-    {"dynamics_weight", &DetectionSettings::dynamics_weight},
-    {"further_points", &DetectionSettings::further_points},
-    {"rate", &DetectionSettings::rate},
-    {"change", &DetectionSettings::change},
+      {"rest_speed_part", &DetectionSettings::rest_speed_part},
+      {"rest_speed_least", &DetectionSettings::rest_speed_least},
+      {"rest_speed_greatest", &DetectionSettings::rest_speed_greatest},
+      {"exact_rest_speed_least", &DetectionSettings::exact_rest_speed_least},
+      {"exact_rest_speed_greatest", &DetectionSettings::exact_rest_speed_greatest},
+      {"moving_speed", &DetectionSettings::moving_speed},
+      {"horizontal_part", &DetectionSettings::horizontal_part},
+      {"rest_duration", &DetectionSettings::rest_duration},
+      {"same_rest", &DetectionSettings::same_rest},
+      {"landing_height", &DetectionSettings::landing_height},
+      {"same_ground", &DetectionSettings::same_ground},
+      {"exact_same_ground", &DetectionSettings::exact_same_ground},
+      {"height_scale_least", &DetectionSettings::height_scale_least},
+      {"height_scale_greatest", &DetectionSettings::height_scale_greatest},
+      {"speed_scale_part", &DetectionSettings::speed_scale_part},
+      {"speed_scale_least", &DetectionSettings::speed_scale_least},
+      {"speed_scale_greatest", &DetectionSettings::speed_scale_greatest},
+      {"force_scale_part", &DetectionSettings::force_scale_part},
+      {"force_scale_least", &DetectionSettings::force_scale_least},
+      {"force_scale_greatest", &DetectionSettings::force_scale_greatest},
+      {"lever", &DetectionSettings::lever},
+      {"contact_gain", &DetectionSettings::contact_gain},
+      {"fine_greatest", &DetectionSettings::fine_greatest},
+      {"coarse_factor", &DetectionSettings::coarse_factor},
+      {"coarse_height", &DetectionSettings::coarse_height},
+      {"coarse_speed", &DetectionSettings::coarse_speed},
+      {"coarse_greatest", &DetectionSettings::coarse_greatest},
+      {"pressed_depth", &DetectionSettings::pressed_depth},
+      {"missing_greatest", &DetectionSettings::missing_greatest},
+      {"missing_factor", &DetectionSettings::missing_factor},
+      {"missing_force", &DetectionSettings::missing_force},
+      {"missing_torque", &DetectionSettings::missing_torque},
+      {"dynamics_weight", &DetectionSettings::dynamics_weight},
+      {"further_points", &DetectionSettings::further_points},
+      {"rate", &DetectionSettings::rate},
+      {"change", &DetectionSettings::change},
   };
   return all;
 }
@@ -104,7 +104,8 @@ bool DetectionSettings::operator==(const DetectionSettings& other) const {
 
 std::ostream& operator<<(std::ostream& out, const DetectionSettings& settings) {
   out << "DetectionSettings(";
-  for (const auto& [name, field] : DetectionSettings::constants()) out << name << "=" << settings.*field << ", ";
+  for (const auto& [name, field] : DetectionSettings::constants())
+    out << name << "=" << settings.*field << ", ";
   return out << "ground_height=" << settings.ground_height << ", ground_velocity=("
              << settings.ground_velocity.x() << ", " << settings.ground_velocity.y() << ", "
              << settings.ground_velocity.z() << "))";

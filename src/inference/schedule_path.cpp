@@ -18,11 +18,11 @@ using Mask = std::uint32_t;
 
 // How many sets there may be in a frame. More are made fewer, see FrameSets.
 constexpr std::size_t kMaximalSets = 256;
-// Sets that lack less than this many times their cost's scale are as good as those that lack
-// nothing: then no other set needs to be looked at.
-constexpr double kNothingMissing = 0.05;
-// A point whose probability is between this and one minus this is not sure.
-constexpr double kSure = 0.02;
+// What costs no more than this is not worth looking for: it is a hundredth of a change of contact.
+constexpr double kNegligible = 0.05;
+// A point whose probability is between this and one minus this is not sure; and sets that cost this
+// much more than the cheapest are not probable.
+constexpr double kSure = 0.02, kImprobable = 7.;
 
 constexpr double kUnknown = -1.;  // what a set is missing, before it was computed
 
@@ -32,6 +32,7 @@ struct FrameSets {
   std::vector<std::vector<Mask>> levels;  // of each limb: sets of its points, the first is empty
   std::vector<float> cost;                // of where the points are
   std::vector<float> missing;             // cost of the dynamics; kUnknown before it is computed
+  float least_missing = 0.f;              // no set is missing less, as far as is known
 
   std::size_t size() const { return cost.size(); }
 
@@ -44,8 +45,9 @@ struct FrameSets {
     return mask;
   }
 
-  double total(std::size_t number) const {
-    return cost[number] + std::max(0.f, missing[number]);
+  // At least, where it is not known what the set is missing.
+  float total(std::size_t number) const {
+    return cost[number] + std::max(least_missing, missing[number]);
   }
 };
 
@@ -70,8 +72,11 @@ class PathFinder {
       mu_.push_back(point.mu);
     }
     limbs_.resize(static_cast<std::size_t>(limbs));
-    for (std::size_t k = 0; k < points.size(); ++k)
+    limb_masks_.resize(limbs_.size(), 0);
+    for (std::size_t k = 0; k < points.size(); ++k) {
       limbs_[static_cast<std::size_t>(points[k].limb)].push_back(static_cast<int>(k));
+      limb_masks_[static_cast<std::size_t>(points[k].limb)] |= Mask(1) << k;
+    }
     levers_.resize(3, Index(points.size()));
     for (Index frame = 0; frame < time.size(); ++frame) sets_.push_back(makeSets(frame));
   }
@@ -91,7 +96,7 @@ class PathFinder {
       if ((found.probability.col(frame).array() > kSure &&
            found.probability.col(frame).array() < 1. - kSure)
               .any())
-        changed = lookAtAll(frame) || changed;
+        changed = lookAtProbable(frame) || changed;
     if (changed) found.probability = findProbability();
     found.sets.reserve(path.size());
     for (std::size_t frame = 0; frame < path.size(); ++frame)
@@ -111,7 +116,7 @@ class PathFinder {
   FrameSets makeSets(Index frame) const;
   double changeOf(Mask before, Mask after) const;
   bool look(Index frame, std::size_t number);
-  bool lookAtAll(Index frame);
+  bool lookAtProbable(Index frame);
   void compute(Index frame, std::size_t number);
   std::vector<std::size_t> findCheapest() const;
   Eigen::MatrixXd findProbability() const;
@@ -125,7 +130,8 @@ class PathFinder {
   const DetectionSettings& settings_;
   const KnownContacts* const known_;
   std::vector<double> mu_;
-  std::vector<std::vector<int>> limbs_;
+  std::vector<std::vector<int>> limbs_;  // points of each
+  std::vector<Mask> limb_masks_;
   std::vector<FrameSets> sets_;
   ConeProjection projection_;
   Eigen::Matrix3Xd levers_;
@@ -150,8 +156,8 @@ double PathFinder::cost(std::size_t index, Index frame) const {
   const double off = pressed ? 0. : height < 0. ? -settings_.pressed_depth - height : height;
   const double vertical = pressed ? 0. : point.velocity(2, frame);
   const double horizontal = point.velocity.col(frame).head<2>().squaredNorm();
-  const double fine = square(off / scales_.height) +
-                      (square(vertical) + horizontal) / square(scales_.speed);
+  const double fine =
+      square(off / scales_.height) + (square(vertical) + horizontal) / square(scales_.speed);
   const double coarse = square(off / settings_.coarse_height) +
                         (square(vertical) + horizontal) / square(settings_.coarse_speed);
   return std::min(fine, settings_.fine_greatest) +
@@ -176,8 +182,8 @@ FrameSets PathFinder::makeSets(Index frame) const {
     std::vector<Level> own = {{0, 0.}};
     for (std::size_t k = 0; k < order.size(); ++k) {
       const double share = k == 0 ? 1. : settings_.further_points;
-      own.push_back({own.back().mask | Mask(1) << order[k].second,
-                     own.back().cost + share * order[k].first});
+      own.push_back(
+          {own.back().mask | Mask(1) << order[k].second, own.back().cost + share * order[k].first});
     }
     if (known_) {
       const Mask possible = own.back().mask;
@@ -206,9 +212,8 @@ FrameSets PathFinder::makeSets(Index frame) const {
       const auto value = [&](const std::vector<Level>& limb) {
         return limb.size() < 2 ? -std::numeric_limits<double>::infinity() : cheapest(limb)->cost;
       };
-      most = std::max_element(levels.begin(), levels.end(), [&](const auto& a, const auto& b) {
-        return value(a) < value(b);
-      });
+      most = std::max_element(levels.begin(), levels.end(),
+                              [&](const auto& a, const auto& b) { return value(a) < value(b); });
       most->resize(1);
     }
     count = 1;
@@ -258,21 +263,38 @@ void PathFinder::compute(Index frame, std::size_t number) {
             (std::min(fine, settings_.missing_greatest) + settings_.missing_factor * coarse));
 }
 
-// Computes what a set is missing, and if that is something, what all others are; whether that was
-// new.
+// Computes what a set is missing, and if that is something, what those are that may be better, even
+// if the path had to leave this one for them and come back; says whether that was new.
 bool PathFinder::look(Index frame, std::size_t number) {
   FrameSets& sets = sets_[static_cast<std::size_t>(frame)];
   if (sets.missing[number] >= 0.f) return false;
   compute(frame, number);
-  if (sets.missing[number] > kNothingMissing) lookAtAll(frame);
+  if (sets.missing[number] <= kNegligible) return true;
+  // Cones are nested: what all points together cannot give, no set can.
+  const std::size_t all = sets.size() - 1;
+  if (sets.missing[all] < 0.f) compute(frame, all);
+  sets.least_missing = sets.missing[all];
+  if (sets.missing[number] - sets.least_missing <= kNegligible) return true;
+  const Mask own = sets.mask(number);
+  for (std::size_t other = 0; other < sets.size(); ++other) {
+    if (sets.missing[other] >= 0.f) continue;
+    const Mask mask = sets.mask(other);
+    double way = 0.;
+    for (const Mask limb : limb_masks_) way += 2. * changeOf(own & limb, mask & limb);
+    if (sets.total(other) <= sets.total(number) + way) compute(frame, other);
+  }
   return true;
 }
 
-bool PathFinder::lookAtAll(Index frame) {
+// Computes what sets are missing that may be probable; says whether there was any.
+bool PathFinder::lookAtProbable(Index frame) {
   FrameSets& sets = sets_[static_cast<std::size_t>(frame)];
   bool changed = false;
+  float least = std::numeric_limits<float>::infinity();
   for (std::size_t number = 0; number < sets.size(); ++number)
-    if (sets.missing[number] < 0.f) {
+    least = std::min(least, sets.total(number));
+  for (std::size_t number = 0; number < sets.size(); ++number)
+    if (sets.missing[number] < 0.f && sets.total(number) <= least + kImprobable) {
       compute(frame, number);
       changed = true;
     }
@@ -322,15 +344,14 @@ std::vector<std::size_t> PathFinder::findCheapest() const {
       origins[frame] = origin;
     }
     for (std::size_t number = 0; number < sets.size(); ++number)
-      value[number] += float(sets.total(number));
+      value[number] += sets.total(number);
     const float least = *std::min_element(value.begin(), value.end());
     for (float& number : value) number -= least;
   }
   std::vector<std::size_t> path(frames);
   if (frames == 0) return path;
   path[frames - 1] = std::size_t(std::min_element(value.begin(), value.end()) - value.begin());
-  for (std::size_t frame = frames; --frame > 0;)
-    path[frame - 1] = origins[frame][path[frame]];
+  for (std::size_t frame = frames; --frame > 0;) path[frame - 1] = origins[frame][path[frame]];
   return path;
 }
 
@@ -341,18 +362,17 @@ Eigen::MatrixXd PathFinder::findProbability() const {
   Eigen::MatrixXd probability = Eigen::MatrixXd::Zero(Index(points_.size()), Index(frames));
   std::vector<std::vector<float>> forward(frames);
   const auto weigh = [&](std::vector<float>& value, const FrameSets& sets) {
-    double least = std::numeric_limits<double>::infinity();
+    float least = std::numeric_limits<float>::infinity();
     for (std::size_t k = 0; k < sets.size(); ++k) least = std::min(least, sets.total(k));
     float sum = 0.f;
     for (std::size_t k = 0; k < sets.size(); ++k)
-      sum += value[k] *= float(std::exp(least - sets.total(k)));
+      sum += value[k] *= std::exp(least - sets.total(k));
     if (sum > 0.f)
       for (float& number : value) number /= sum;
     else
       std::fill(value.begin(), value.end(), 1.f / float(value.size()));
   };
-  const auto move = [&](std::vector<float>& value, const FrameSets& before,
-                        const FrameSets& sets) {
+  const auto move = [&](std::vector<float>& value, const FrameSets& before, const FrameSets& sets) {
     std::vector<float> next;
     std::size_t below = 1, above = before.size();
     for (std::size_t limb = 0; limb < sets.levels.size(); ++limb) {
@@ -409,9 +429,8 @@ Eigen::MatrixXd PathFinder::findProbability() const {
 
 SchedulePath findSchedulePath(const std::vector<PointTrack>& points,
                               const std::vector<Rests>& rests, const CostScales& scales,
-                              const WrenchTrack& wrench, double weight,
-                              const Eigen::VectorXd& time, const DetectionSettings& settings,
-                              const KnownContacts* known) {
+                              const WrenchTrack& wrench, double weight, const Eigen::VectorXd& time,
+                              const DetectionSettings& settings, const KnownContacts* known) {
   return PathFinder(points, rests, scales, wrench, weight, time, settings, known).find();
 }
 

@@ -35,8 +35,8 @@ struct SchedulePath {
 /// @param known   null where nothing is
 SchedulePath findSchedulePath(const std::vector<PointTrack>& points,
                               const std::vector<Rests>& rests, const CostScales& scales,
-                              const WrenchTrack& wrench, double weight,
-                              const Eigen::VectorXd& time, const DetectionSettings& settings,
+                              const WrenchTrack& wrench, double weight, const Eigen::VectorXd& time,
+                              const DetectionSettings& settings,
                               const KnownContacts* known = nullptr);
 
 }  // namespace dynacom::internal

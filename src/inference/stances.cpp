@@ -66,8 +66,7 @@ void mergeRests(const PointTrack& point, const Eigen::VectorXd& speed, double sl
     if (!merged.empty()) {
       Rest& last = merged.back();
       const Index between = rest.first - last.behind;
-      const double fastest =
-          between > 0 ? speed.segment(last.behind, between).maxCoeff() : 0.;
+      const double fastest = between > 0 ? speed.segment(last.behind, between).maxCoeff() : 0.;
       if (fastest < 2. * slow && std::abs(rest.height - last.height) <= same) {
         last = makeRest(point, last.first, rest.behind);
         continue;
@@ -118,7 +117,8 @@ double rise(const PointTrack& point, const std::vector<Rest>& rests, std::size_t
 
 // Velocities of which the ground may have one are counted in squares of this size [m/s].
 constexpr double kVelocityStep = 0.1;
-// Low is what is no higher than this above a point's lowest place, but for the lowest twentieth [m].
+// Low is what is no higher than this above a point's lowest place, but for the lowest twentieth
+// [m].
 constexpr double kLow = 0.03, kLowest = 0.05;
 // The ground moves if its velocity is this many times as frequent as rest, in a part of the frames.
 constexpr double kMoreFrequent = 3., kFrequent = 0.1;
@@ -139,14 +139,15 @@ Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
     for (Index frame = 0; frame < frames; ++frame) {
       const Eigen::Vector3d velocity = point.velocity.col(frame);
       if (point.position(2, frame) > low || std::abs(velocity.z()) > kVelocityStep) continue;
-      squares[{std::lround(velocity.x() / kVelocityStep), std::lround(velocity.y() / kVelocityStep)}]
+      squares[{std::lround(velocity.x() / kVelocityStep),
+               std::lround(velocity.y() / kVelocityStep)}]
           .push_back(velocity.head<2>());
     }
   }
   const std::size_t at_rest = squares[{0, 0}].size();
-  const auto most = std::max_element(squares.begin(), squares.end(), [](const auto& a, const auto& b) {
-    return a.second.size() < b.second.size();
-  });
+  const auto most = std::max_element(
+      squares.begin(), squares.end(),
+      [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
   Eigen::Vector3d ground = Eigen::Vector3d::Zero();
   if (double(most->second.size()) <= kMoreFrequent * double(at_rest) ||
       double(most->second.size()) < kFrequent * double(all))
@@ -175,10 +176,10 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
     for (Index frame = 0; frame < time.size(); ++frame)
       if (point.velocity.col(frame).norm() > settings.moving_speed) moving.push_back(speed[frame]);
     const double fast = moving.empty() ? 0. : quantile(moving, kFast);
-    const double slow = std::clamp(
-        settings.rest_speed_part * fast,
-        exact ? settings.exact_rest_speed_least : settings.rest_speed_least,
-        exact ? settings.exact_rest_speed_greatest : settings.rest_speed_greatest);
+    const double slow =
+        std::clamp(settings.rest_speed_part * fast,
+                   exact ? settings.exact_rest_speed_least : settings.rest_speed_least,
+                   exact ? settings.exact_rest_speed_greatest : settings.rest_speed_greatest);
     std::vector<Rest>& rests = all[k].list;
     rests = findRuns(point, speed, time, slow, settings.rest_duration);
     mergeRests(point, speed, slow, settings.same_rest, rests);
@@ -219,10 +220,12 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
 CostScales findScales(const std::vector<PointTrack>& points, const std::vector<Rests>& rests,
                       const Eigen::VectorXd& time, const DetectionSettings& settings) {
   const Index frames = time.size();
-  Eigen::Array<bool, Eigen::Dynamic, 1> moves = Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, false);
+  Eigen::Array<bool, Eigen::Dynamic, 1> moves =
+      Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, false);
   for (const PointTrack& point : points)
     moves = moves || point.velocity.colwise().norm().transpose().array() > settings.moving_speed;
-  Eigen::Array<bool, Eigen::Dynamic, 1> counts = Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, !moves.any());
+  Eigen::Array<bool, Eigen::Dynamic, 1> counts =
+      Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, !moves.any());
   double last = -std::numeric_limits<double>::infinity();
   for (Index frame = 0; frame < frames; ++frame) {
     if (moves[frame]) last = time[frame];
@@ -248,8 +251,10 @@ CostScales findScales(const std::vector<PointTrack>& points, const std::vector<R
     return values.empty() ? greatest : std::clamp(part * quantile(values, 0.5), least, greatest);
   };
   CostScales scales;
-  scales.height = scale(scatter, kDeviation, settings.height_scale_least, settings.height_scale_greatest);
-  scales.speed = scale(speeds, settings.speed_scale_part, settings.speed_scale_least, settings.speed_scale_greatest);
+  scales.height =
+      scale(scatter, kDeviation, settings.height_scale_least, settings.height_scale_greatest);
+  scales.speed = scale(speeds, settings.speed_scale_part, settings.speed_scale_least,
+                       settings.speed_scale_greatest);
   scales.force = std::clamp(settings.force_scale_part * scales.speed, settings.force_scale_least,
                             settings.force_scale_greatest);
   scales.torque = settings.lever * scales.force;

@@ -36,8 +36,8 @@ struct CostScales {
 std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen::VectorXd& time,
                              bool exact, const DetectionSettings& settings);
 
-/// The velocity of the ground [m/s]: the one that low points have that move level, where that is far
-/// more frequent than rest; else zero.
+/// The velocity of the ground [m/s]: the one that low points have that move level, where that is
+/// far more frequent than rest; else zero.
 Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points);
 
 /// The scales of the costs, from what points do at rest.
