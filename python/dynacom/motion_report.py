@@ -95,8 +95,9 @@ _MEASURED_COLUMNS = (("measured_force", _XYZ, "N"), ("measured_torque", _XYZ, "N
 # From which height on a ground is worth a question: most files have theirs at zero [m].
 _FAR_FROM_ZERO = 0.1
 
-# From which mean residual on it may be a load that nobody has told of [m g], [m g m].
-_LOAD = 0.01
+# From which mean residual on it may be a load that nobody has told of [m g], [m g m]: a box that a
+# G1 carries for half of a clip comes to 0.005.
+_LOAD = 0.003
 
 #: What may be wrong with a motion: code -> unit of its worst value, and what it means.
 FAULTS: dict[str, tuple[str, str]] = describeFaults()
