@@ -254,10 +254,10 @@ def test_windows_are_printed(command, tmp_path):
     arrays["q"][159, 0] += 1.0
     np.savez(tmp_path / "clip.npz", **arrays)
     out = tmp_path / "out"
-    command("analyze", tmp_path / "clip.npz", "--robot", "talos", "--no-page", "--out", out)
+    arguments = ["analyze", tmp_path / "clip.npz", "--robot", "talos", "--no-page", "--out", out]
+    printed = command(*arguments)[1]
     (first, second), share = summary(out)["windows"], summary(out)["feasible_share"]
     assert first[1] < 158 * 0.02 < 160 * 0.02 < second[0]
-    _, printed, _ = command("analyze", tmp_path / "clip.npz", "--robot", "talos", "--out", out)
     assert dict(cells(printed))["Without fault"] == (
         f"{share:.1%} of the frames: {first[0]:.2f} to {first[1]:.2f} s, "
         f"{second[0]:.2f} to {second[1]:.2f} s"

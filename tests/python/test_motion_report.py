@@ -894,7 +894,12 @@ def test_the_record_counts_for_jumps(talos, bare):
     assert jump["text"].startswith("the motion jumps: more than 1 of the greatest speed in 2 of")
     assert jump["text"].endswith("(root)")
     # Before and after it the walk is what it was.
-    assert report["fault"][[98, 99, 100, 101]].tolist() == ["", "discontinuity", "discontinuity", ""]
+    assert report["fault"][[98, 99, 100, 101]].tolist() == [
+        "",
+        "discontinuity",
+        "discontinuity",
+        "",
+    ]
     first, second = report.summary["windows"]
     assert (first[0], second[1]) == (bare.time[0], bare.time[-1])
     assert first[1] <= bare.time[98] and second[0] >= bare.time[101]

@@ -358,7 +358,7 @@ def test_windows():
 
 
 def test_normals(stand):
-    """Of what is active: here one foot is turned upside down with the body, for half of the time."""
+    """Of what is active: here one foot, upside down with the body for half of the time."""
     stand.q[:50, 3:7] = [1.0, 0.0, 0.0, 0.0]
     stand.active[:, 1] = False
     one, other = stand.judge().normals
