@@ -1027,6 +1027,9 @@ def test_a_dance_steps(samples):
         assert np.diff(report["time"][steps]).min() > 0.09
     assert not reason(report, "discontinuity")["holds"]
     assert report.summary["windows"]
+    # What is missing has no direction: it is no load.
+    assert any("cannot give" in note for note in report.summary["notes"])
+    assert not any("load" in note for note in report.summary["notes"])
 
 
 @pytest.mark.parametrize(
