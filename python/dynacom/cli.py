@@ -2,7 +2,8 @@
 """The command ``dynacom``.
 
 Exit status 0 when what was asked for was done, whatever came out; 1 where ``--check`` asked whether
-a motion is feasible, and it is not, or nobody knows; 2 for bad input, which one line on stderr explains.
+a motion is feasible, and it is not, or nobody knows; 2 for bad input, which one line on stderr
+explains.
 """
 
 import signal
