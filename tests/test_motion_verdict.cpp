@@ -378,10 +378,10 @@ BOOST_AUTO_TEST_CASE(windows_are_what_is_long_and_without_fault) {
   BOOST_TEST(windows({{63, 99}}));
   // A jump ends a window, however short it is.
   stand.ground.setZero();
-  stand.recorded.q(0, 50) = 1.;
-  BOOST_TEST(windows({{0, 48}, {52, 99}}));
+  stand.recorded.q.rightCols(50).row(0).setConstant(1.);  // two frames, 0.08 s
+  BOOST_TEST(windows({{0, 48}, {51, 99}}));
   // Frames that are unsure neither end one, nor are they beyond.
-  stand.recorded.q(0, 50) = 0.;
+  stand.recorded.q = stand.motion.q;
   stand.motion.a.row(2).segment(40, 20).setConstant(-20.);
   BOOST_TEST(windows({}) == false);
   stand.settings.minimal_window = 0.5;

@@ -82,7 +82,7 @@ struct DYNACOM_EXPORT VerdictSettings {
   /// Frames so close to a jump are unsure, as are two at either side at least, ≥ 0 [s]: filters and
   /// differences spread a jump over them. At 6 Hz, a jump of a humanoid's shoulder by 2 rad is
   /// beyond the limits of forces for 0.14 s, one of its root by 0.3 m for 0.26 s.
-  double jump_time = 0.2;
+  double jump_time = 0.25;
   /// How long a window is at least, ≥ 0 [s].
   double minimal_window = 1.;
   /// Interruptions of a window that are shorter than this are none where there is as much time

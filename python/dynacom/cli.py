@@ -2,7 +2,8 @@
 """The command ``dynacom``.
 
 Exit status 0 when what was asked for was done, whatever came out; 1 where ``--check`` asked whether
-a motion is feasible, and it is not; 2 for bad input, which one line on stderr explains.
+a motion is feasible, and it is not, or nobody knows; 2 for bad input, which one line on stderr
+explains.
 """
 
 import signal
@@ -208,7 +209,7 @@ def analyze(
         bool, typer.Option("--page/--no-page", help="Write report.html? It takes the longest.")
     ] = True,
     check: Annotated[
-        bool, typer.Option("--check", help="Exit with status 1 if the motion is not feasible.")
+        bool, typer.Option("--check", help="Exit with status 1 unless the motion is feasible.")
     ] = False,
 ) -> None:
     """Judge a motion: is it physically possible, when not and why, what do the feet feel?

@@ -222,9 +222,9 @@ def _head(summary: Mapping[str, Any]) -> str:
 
 def _verdict(summary: Mapping[str, Any]) -> str:
     verdict = summary["verdict"]
-    held = [reason for reason in summary["reasons"] if reason["code"] in summary["codes"]]
-    others = [reason for reason in summary["reasons"] if reason not in held]
     kind = {"feasible": "good", "not feasible": "bad"}.get(verdict, "unknown")
+    held = [item for item in summary["reasons"] if item["holds"] and kind == "bad"]
+    others = [item for item in summary["reasons"] if item not in held]
     parts = [
         f'<section class="verdict {kind}">',
         f"<h2>{escape(verdict[:1].upper() + verdict[1:])}</h2>",
@@ -237,8 +237,9 @@ def _verdict(summary: Mapping[str, Any]) -> str:
         parts.append(_reasons(held))
     if others:
         plural = "reasons do" if len(others) > 1 else "reason does"
+        title = "What was measured" if kind == "unknown" else f"{len(others)} {plural} not hold"
         parts += [
-            f"<details><summary>{len(others)} {plural} not hold</summary>",
+            f"<details><summary>{title}</summary>",
             _reasons(others),
             "</details>",
         ]

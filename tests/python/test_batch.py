@@ -85,16 +85,18 @@ def test_a_row_for_each_file_whatever_it_is(clips, result):
 def test_values_are_those_of_analyze(result, anymal):
     table, _ = result
     good = [row for row in table.to_pylist() if row["status"] == "ok"]
-    assert {row["verdict"] for row in good} == {"feasible", "not feasible"}
+    assert {row["verdict"] for row in good} == {"feasible", "not feasible", "unknown"}
     for row in good:
         report = dynacom.analyze(row["file"], anymal)
         summary = report.summary
         for name in (
             *("verdict", "codes", "frames", "duration", "frame_rate", "mass", "omega", "cutoff"),
-            *("mean_vertical_force", "momentum_change"),
+            *("mean_vertical_force", "momentum_change", "feasible_share", "windows"),
         ):
             assert row[name] == summary[name], name
-        assert row["feasible"] == report.verdict.feasible
+        known = row["verdict"] != "unknown"
+        assert row["feasible"] is (report.verdict.feasible if known else None)
+        assert known != (row["codes"] == ["too_short"])
         assert row["error"] is row["clip"] is None
         assert row["dynacom"] == dynacom.__version__
         assert row["seconds"] > 0.0
@@ -587,8 +589,9 @@ def test_index(clips, result):
     good = [row for row in table.to_pylist() if row["status"] == "ok"]
     assert f"<h1>{table.num_rows} clips of {ROBOT}</h1>" in page
     for text, count in (
-        ("feasible", sum(row["feasible"] for row in good)),
-        ("not feasible", sum(not row["feasible"] for row in good)),
+        ("feasible", sum(row["feasible"] is True for row in good)),
+        ("not feasible", sum(row["feasible"] is False for row in good)),
+        ("unknown: too short", 1),
         ("error", len(bad)),
     ):
         assert re.search(rf'<td>{text}</td><td class="n">{count} \(', page)

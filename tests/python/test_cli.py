@@ -231,6 +231,39 @@ def test_check(command, tmp_path):
     assert summary(tmp_path)["codes"] == ["foot_sliding"]
 
 
+def test_check_of_what_is_unknown(command, tmp_path, clip):
+    """Three frames are not feasible either."""
+    path = write_csv(tmp_path / "clip.csv", clip.table[:3])
+    out = tmp_path / "out"
+    arguments = ["analyze", path, "--robot", "g1", "--fps", 60, "--no-page", "--out", out]
+    assert command(*arguments)[0] == 0
+    status, printed, err = command(*arguments, "--check")
+    assert (status, err) == (1, "")
+    rows = cells(printed)
+    assert rows[:2] == [
+        ("Verdict", "unknown"),
+        ("too_short", "there are too few frames whose accelerations are known"),
+    ]
+    assert summary(out)["codes"] == ["too_short"]
+
+
+def test_windows_are_printed(command, tmp_path):
+    """The clip's jump parts them."""
+    with np.load(WALK) as file:
+        arrays = {name: file[name] for name in ("t", "q", "contacts", "contact_names")}
+    arrays["q"][159, 0] += 1.0
+    np.savez(tmp_path / "clip.npz", **arrays)
+    out = tmp_path / "out"
+    arguments = ["analyze", tmp_path / "clip.npz", "--robot", "talos", "--no-page", "--out", out]
+    printed = command(*arguments)[1]
+    (first, second), share = summary(out)["windows"], summary(out)["feasible_share"]
+    assert first[1] < 158 * 0.02 < 160 * 0.02 < second[0]
+    assert dict(cells(printed))["Without fault"] == (
+        f"{share:.1%} of the frames: {first[0]:.2f} to {first[1]:.2f} s, "
+        f"{second[0]:.2f} to {second[1]:.2f} s"
+    )
+
+
 # Options.
 
 
@@ -374,13 +407,14 @@ def test_a_robot_without_a_file(command, tmp_path, talos):
 
 
 def test_what_is_printed(analyze, motion_file, talos):
-    limits = (f"verdict.{code}.limit=0" for code in ("foot_sliding", "discontinuity"))
+    limits = (f"verdict.{code}.limit=0" for code in ("foot_sliding", "ground_penetration"))
     out, printed = analyze(motion_file(), *(part for text in limits for part in ("--set", text)))
     rows, found = cells(printed), summary(out)
     assert rows[0] == ("Verdict", "not feasible")
     reasons = [entry for entry in found["reasons"] if entry["holds"]]
     assert len(reasons) >= 2
     assert rows[1 : 1 + len(reasons)] == [(entry["code"], entry["text"]) for entry in reasons]
+    assert rows[1 + len(reasons)] == ("Without fault", "no window of 1 s or more")
     table = dict(rows)
     assert table["Motion"] == "0.780 s, 40 frames at 50 Hz"
     for status, count in found["statuses"].items():

@@ -40,7 +40,6 @@ def test_not_finite(check, value):
 
 
 def test_too_large(check):
-    check(changed(0, 3, 1e308), "the root jumps by")
     check(changed(6, 3, 1e308), "norm 1, got inf in frame 3")
 
 
@@ -193,23 +192,20 @@ def test_degrees_by_name(tmp_path, toy):
     refuses(write_columns(tmp_path / "clip.csv", columns), toy, "got degrees: b_toe")
 
 
-def test_large_numbers_that_are_no_degrees_either(check):
-    """Whatever they are, they are no motion."""
+def test_large_numbers_that_are_no_degrees_either(tmp_path, toy):
+    """Whatever they are, they are no motion: a matter of the verdict."""
     rng = np.random.default_rng(0)
-    message = check(
-        lambda table: np.hstack([table[:, :7], rng.uniform(-500.0, 500.0, (90, 5))]), "jumps by"
-    )
-    assert "degrees" not in message
+    table = np.hstack([sway(toy).table[:, :7], rng.uniform(-500.0, 500.0, (90, 5))])
+    clip = read_motion(write_csv(tmp_path / "clip.csv", table), toy, fps=60)
+    assert_notes(clip, "order of the URDF", "goes beyond its limits")
 
 
-def test_a_single_joint_is_not_in_degrees(check):
+def test_a_single_joint_is_not_in_degrees(tmp_path, toy):
     """But it counts turns that it cannot make."""
-
-    def turn(table):
-        table[:, 7] += 2.0 * np.pi * (np.arange(90) > 20)
-        return table
-
-    assert "degrees" not in check(turn, "z_knee jumps by 6.")
+    table = sway(toy).table
+    table[:, 7] += 2.0 * np.pi * (np.arange(90) > 20)
+    clip = read_motion(write_csv(tmp_path / "clip.csv", table), toy, fps=60)
+    assert_notes(clip, "order of the URDF", "z_knee (-1.5 to 1.5 rad) goes beyond its limits")
 
 
 def test_beyond_limits_but_not_in_degrees(tmp_path, toy):
@@ -237,28 +233,18 @@ def from_frame(column, frame, step):
     return change
 
 
-def test_jumps(check):
-    check(
-        from_frame(1, 40, 0.3),
-        "the root jumps by 0.30",
-        " m between frame 39 (0.65 s) and the next: 1",
-        " m/s, expected at most 10",
-    )
-    check(
-        lambda table: np.vstack([table[:40], turned(table[40:], np.array([0.0, 0.0, 1.0]))]),
-        "the root's orientation jumps by 1.01 rad between frame 39 (0.65 s) and the next",
-        "rad/s, expected at most 30",
-    )
-    check(from_frame(7, 40, 0.9), "z_knee jumps by 0.", " rad between frame 39", "at most 50")
-    check(from_frame(10, 40, -0.2), "a_slide jumps by 0.203 m between frame 39", "at most 10")
-
-
-def test_spikes(check):
-    def spike(table):
-        table[40, 8] += 1.0
-        return table
-
-    check(spike, "m_hip jumps by")
+@pytest.mark.parametrize(
+    ("column", "step"), [(1, 0.3), (7, 0.9), (8, 1.0), (9, 2.0 * np.pi + 2.0), (10, -0.2)]
+)
+def test_jumps_are_read(tmp_path, toy, column, step):
+    """They are a matter of the verdict: the rest of a clip may be good."""
+    table = from_frame(column, 40, step)(sway(toy).table)
+    clip = read_motion(write_csv(tmp_path / "clip.csv", table), toy, fps=60)
+    assert len(clip.time) == 90
+    if column != 9:  # of the wheel there are a sine and a cosine
+        jump = np.abs(np.diff(clip.q, axis=0)).max(axis=1)
+        assert np.argmax(jump) == 39
+        assert jump[39] == pytest.approx(abs(step), abs=0.1)
 
 
 @pytest.mark.parametrize("turns", [-1.0, 1.0, 3.0])
@@ -277,21 +263,11 @@ def test_a_wheel_may_turn_on_and_on(tmp_path, toy):
     np.testing.assert_allclose(clip.q[:, index], np.cos(table[:, 9]), atol=1e-15)
 
 
-def test_a_wheel_may_not_jump(check):
-    check(from_frame(9, 40, 2.0 * np.pi + 2.0), "c_wheel jumps by 1.98", "rad")
-
-
 def test_signs_of_quaternions_are_no_jumps(tmp_path, toy):
     table = sway(toy).table
     table[1::2, 3:7] *= -1.0
     clip = read_motion(write_csv(tmp_path / "clip.csv", table), toy, fps=60)
     np.testing.assert_allclose(clip.q[:, 3:7], table[:, 3:7], atol=1e-15)
-
-
-def test_what_is_a_jump_depends_on_the_time_it_takes(tmp_path, toy):
-    path = write_csv(tmp_path / "clip.csv", sway(toy).table[::6])
-    assert len(read_motion(path, toy, fps=10).time) == 15
-    refuses(path, toy, "jumps by", fps=1000)
 
 
 @pytest.mark.parametrize("frames", [1, 2])

@@ -93,7 +93,6 @@ def test_a_dance(shared_data, humanoid):
     assert_notes(clip, "in the order of the URDF")
     refuses(path, humanoid, "give --fps")
     refuses(path, humanoid, "got x y z w", "give --quat xyzw", fps=60, quat="wxyz")
-    refuses(path, humanoid, "right_shoulder_pitch_joint jumps", "78.7 rad/s", fps=120)
 
 
 def test_a_clip_with_a_box(shared_data, humanoid, talos):

@@ -97,6 +97,11 @@ def test_page_in_a_browser(hurried_page, hurried, request, root):
             assert max(lengths) > 100.0, plot
         assert tab.locator("#schedule .bars path").count() >= 10
         at_first = settled_picture(tab, "#scene")
+
+        # Windows are bands along the axes of time.
+        shapes = tab.evaluate("document.getElementById('forces').layout.shapes")
+        bands = [[shape["x0"], shape["x1"]] for shape in shapes if shape["type"] == "rect"]
+        assert_allclose(bands, summary["windows"])
         assert at_first.std(axis=(0, 1)).min() > 0.02
 
         # A reason leads to its time, everywhere.
@@ -233,11 +238,26 @@ def test_feasible_walk(talos, tmp_path, monkeypatch):
     write_page(tmp_path / "bare.html", talos, q, arrays, summary | none)
     full, bare = ((tmp_path / f"{name}.html").read_text("utf-8") for name in ("full", "bare"))
     for text in (full, bare):
-        assert '<section class="verdict good"><h2>Feasible</h2><details>' in text
+        assert '<section class="verdict good"><h2>Feasible</h2><p class="caption">Windows' in text
+        assert "75.0&nbsp;% of the frames" in text
+        assert text.count('class="time"') == 4 + len(summary["reasons"])
         assert text.count("<code>") == len(summary["reasons"])
     for title in ("How it depends on the filter", "Computed against the file's forces"):
         assert title in full
         assert title not in bare
+
+
+def test_unknown(talos, tmp_path, monkeypatch):
+    """What would hold is only shown."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    q, arrays, summary = walk_report(talos)
+    for item in summary["reasons"]:
+        item["holds"] = True
+    unknown = {"verdict": "unknown", "windows": [], "feasible_share": 0.0}
+    write_page(tmp_path / "report.html", talos, q, arrays, summary | unknown)
+    text = (tmp_path / "report.html").read_text("utf-8")
+    assert '<section class="verdict unknown"><h2>Unknown</h2><p><code>too_short</code>' in text
+    assert text.index("<summary>What was measured") < text.index("<code>residual_force")
 
 
 def test_without_viser(talos, hurried, tmp_path, monkeypatch):

@@ -76,6 +76,8 @@ def objects(talos, talos_standing, talos_motion):
         report,
         report.verdict,
         report.verdict.findings["foot_sliding"],
+        report.verdict.windows[0],
+        report.verdict.normals[0],
         recorded,
         examiner,
         examination,
