@@ -23,7 +23,7 @@ struct DYNACOM_EXPORT DetectionSettings {
 
   /// Speed [m/s] below which a point is at rest: this part of how fast it gets (the 95th percentile
   /// of its speeds above `moving_speed`), between a least and a greatest.
-  double rest_speed_part = 0.2, rest_speed_least = 0.08, rest_speed_greatest = 0.2;
+  double rest_speed_part = 0.2, rest_speed_least = 0.04, rest_speed_greatest = 0.2;
   /// The same bounds for exact motions, whose points are at rest where they stand [m/s].
   double exact_rest_speed_least = 0.02, exact_rest_speed_greatest = 0.05;
   /// From where on a point moves [m/s].
@@ -32,7 +32,7 @@ struct DYNACOM_EXPORT DetectionSettings {
   double horizontal_part = 0.4;
   /// How long a point is at rest at least [s].
   double rest_duration = 0.03;
-  /// Rests between which a point moves no faster than twice the above, and whose heights differ by
+  /// Rests between which a point moves no faster than three times the above, and whose heights differ by
   /// no more than this, are one [m].
   double same_rest = 0.01;
 

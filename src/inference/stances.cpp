@@ -67,7 +67,7 @@ void mergeRests(const PointTrack& point, const Eigen::VectorXd& speed, double sl
       Rest& last = merged.back();
       const Index between = rest.first - last.behind;
       const double fastest = between > 0 ? speed.segment(last.behind, between).maxCoeff() : 0.;
-      if (fastest < 2. * slow && std::abs(rest.height - last.height) <= same) {
+      if (fastest < 3. * slow && std::abs(rest.height - last.height) <= same) {
         last = makeRest(point, last.first, rest.behind);
         continue;
       }
