@@ -26,7 +26,8 @@ from dynacom.motion_report import examine, make_examiner
 # In the order in which they are done; these are those of MotionExaminer.examine.
 EXAMINATION = (
     "filter and derivatives",
-    "contacts",
+    "contacts' motions",
+    "inference of contacts",
     "dynamics and distribution",
     "verdict and statistics",
 )
@@ -59,6 +60,7 @@ class Bench:
         self.job = Job(dynacom.load_robot("g1"), dynacom.AnalysisOptions(), fps=clips.FPS)
         self.judge = Judge(self.job)
         self.robot = self.job.robot.dynacom()
+        self.parts = dynacom.splitContacts(self.robot)
         options = self.job.options
         self.examiner = make_examiner(self.job.robot, options, sensitivity=False, threads=1)
         self.ours, self.its = Pipe()
@@ -97,19 +99,26 @@ class Bench:
             seconds[name] += taken
             return value
 
-        deriving, placing, distributing, judging = EXAMINATION
+        deriving, placing, inferring, distributing, judging = EXAMINATION
         derived = step(deriving, dynacom.deriveMotion, model, recorded, cutoff)
-        motion = derived.motion
+        motion, parts = derived.motion, self.parts
         contacts = step(placing, dynacom.computeContactMotions, robot, motion, threads=1)
-        found = contacts, times
-        ground = step(placing, dynacom.estimateGround, *found, options.detection)
-        schedule = step(placing, dynacom.detectContacts, *found, ground, options.detection)
-        robot.setGroundHeight(float(ground.mean()))
+        corners = step(placing, dynacom.computeContactMotions, parts.robot, motion, threads=1)
         how = {"flatHorizontalGround": options.flat, "omega": options.omega, "threads": 1}
-        analysis = step(distributing, dynacom.analyzeMotion, robot, motion, schedule, **how)
-        found = motion, recorded, contacts, ground, analysis, options.verdict
-        verdict = step(judging, dynacom.judgeMotion, robot, *found, threads=1)
-        step(judging, dynacom.summarizeMotion, robot, motion, analysis, verdict)
+        none = dynacom.ContactSchedule([], np.zeros((frames, 0), dtype=bool))
+        needed = step(inferring, dynacom.analyzeMotion, parts.robot, motion, none, **how)
+        exact = derived.cutoff == 0.0 or (
+            derived.is_automatic and derived.thinned_noise <= dynacom.kExactNoise
+        )
+        inference = step(
+            inferring, dynacom.inferContacts, parts, corners, needed, exact, options.detection
+        )
+        schedule, ground = inference.schedule, inference.ground
+        analysis = step(distributing, dynacom.analyzeMotion, parts.robot, motion, schedule, **how)
+        found = motion, recorded, corners, ground, analysis, options.verdict
+        verdict = step(judging, dynacom.judgeMotion, parts.robot, *found, threads=1)
+        whole = step(judging, dynacom.gatherParts, robot, parts, contacts, corners, analysis)
+        step(judging, dynacom.summarizeMotion, robot, motion, whole, verdict)
         return seconds
 
     def writing(self, files, times):

@@ -87,10 +87,12 @@ Clip readDance() {
       Eigen::VectorXd::LinSpaced(frames, 0., double(frames - 1) / kDanceRate);
   clip.motion =
       differentiate(model, time, filterConfigurations(model, q, kDanceRate, kDanceCutoff));
-  const auto contacts = computeContactMotions(clip.robot, clip.motion);
-  const Eigen::VectorXd ground = estimateGround(contacts, time);
-  clip.schedule = detectContacts(contacts, time, ground);
-  clip.robot.setGroundHeight(ground.mean());
+  const PartRobot parts = splitContacts(clip.robot);
+  const ContactSchedule none{{}, ContactSchedule::Matrix(0, frames)};
+  const ContactInference found =
+      inferContacts(parts, computeContactMotions(parts.robot, clip.motion),
+                    analyzeMotion(parts.robot, clip.motion, none), false);
+  clip.schedule = gatherParts(clip.robot, parts, found.schedule);
   return clip;
 }
 

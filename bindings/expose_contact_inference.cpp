@@ -48,6 +48,11 @@ MotionAnalysis gather(const DynaCoM& robot, const PartRobot& parts, const bp::ob
                      toVectorOf<ContactMotion>(motions), analysis);
 }
 
+ContactSchedule gatherSchedule(const DynaCoM& robot, const PartRobot& parts,
+                               const ContactSchedule& schedule) {
+  return gatherParts(robot, parts, schedule);
+}
+
 }  // namespace
 
 void exposeContactInference() {
@@ -125,6 +130,9 @@ void exposeContactInference() {
           "The MotionAnalysis of a robot from that of its parts, whose contacts become its parts.\n"
           "contacts, motions: of computeContactMotions for the robot and for its parts. Raises\n"
           "ValueError if sizes differ.");
+  bp::def("gatherParts", &gatherSchedule, (bp::arg("robot"), bp::arg("parts"), bp::arg("schedule")),
+          "The same of a ContactSchedule: a contact is active if any of its parts is, and as\n"
+          "probable as its most probable part.");
   bp::def("inferContacts", &infer,
           (bp::arg("parts"), bp::arg("motions"), bp::arg("dynamics"), bp::arg("exact"),
            bp::arg("settings") = Settings(), bp::arg("recorded") = bp::object()),

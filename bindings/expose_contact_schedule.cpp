@@ -72,7 +72,8 @@ void exposeContactSchedule() {
           "How readily a contact bears load while it is active, rho: weights are divided\n"
           "by its square root; (T, C), or None for 1")
       .def("validate", &Schedule::validate, (bp::arg("self"), bp::arg("frames")),
-           "Raises ValueError if a name is there twice or a matrix is not (frames, C).")
+           "Raises ValueError if a name is there twice, or a matrix is not (frames, C) or has a\n"
+           "number out of its range.")
       .def(PrintVisitor<Schedule>(&writeSchedule))
       .def(CopyVisitor<Schedule>());
 

@@ -195,7 +195,7 @@ void exposeMotionVerdict() {
       (bp::arg("robot"), bp::arg("motion"), bp::arg("recorded"), bp::arg("contacts"),
        bp::arg("ground"), bp::arg("analysis"), bp::arg("settings") = VerdictSettings(),
        bp::arg("threads") = 0, bp::arg("unsure") = bp::object()),
-      "Judges a motion, for which computeContactMotions, estimateGround and analyzeMotion have\n"
+      "Judges a motion, for which computeContactMotions, inferContacts and analyzeMotion have\n"
       "been called. recorded: the RecordedMotion before any filter, in whose q jumps are looked\n"
       "for, and whose v and a say whether the motion's are recorded ones: if not, fewer than\n"
       "kMinimalFrames frames are unknown; ground: height under each contact, (C,) or (T, C) [m],\n"

@@ -134,6 +134,17 @@ void ContactSchedule::validate(Eigen::Index frames) const {
     internal::requireSize(name, values->rows(), active.rows(), "contacts");
     internal::requireSize(name, values->cols(), frames, "frames");
   }
+  const auto requireRange = [](const char* name, const Eigen::MatrixXd& values, bool may_be_zero) {
+    for (Eigen::Index frame = 0; frame < values.cols(); ++frame)
+      for (Eigen::Index row = 0; row < values.rows(); ++row) {
+        const double value = values(row, frame);
+        if (!((may_be_zero ? value >= 0. : value > 0.) && value <= 1.))
+          throwInvalid(name, " must be ", may_be_zero ? ">= 0" : "> 0", " and <= 1, got ", value,
+                       " in frame ", frame);
+      }
+  };
+  requireRange("confidence", confidence, true);
+  requireRange("readiness", readiness, false);
 }
 
 std::vector<ContactMotion> computeContactMotions(const DynaCoM& robot, const Motion& motion,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "dynacom/motion_examination.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <mutex>
@@ -60,6 +61,22 @@ double findMeanGround(const ContactInference& found, double otherwise) {
         ++count;
       }
   return count > 0 ? sum / double(count) : otherwise;
+}
+
+// How sure recorded contacts are: as the record says, else as sure as can be.
+Eigen::MatrixXd findRecordedConfidence(const std::vector<std::string>& names,
+                                       const ContactSchedule& recorded) {
+  Eigen::MatrixXd confidence =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(names.size()), recorded.active.cols());
+  for (std::size_t k = 0; k < recorded.names.size(); ++k) {
+    const auto place = std::find(names.begin(), names.end(), recorded.names[k]) - names.begin();
+    const auto row = static_cast<Eigen::Index>(k);
+    if (recorded.confidence.size() > 0)
+      confidence.row(place) = recorded.confidence.row(row);
+    else
+      confidence.row(place) = recorded.active.row(row).cast<double>();
+  }
+  return confidence;
 }
 
 // Frames whose accelerations a filter has smeared: those around the beginning and the end of a
@@ -151,6 +168,8 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   }
   const ContactSchedule& schedule = found.inference.schedule;
   found.schedule = gatherParts(robot, parts, schedule);
+  if (recorded.schedule.has_value())
+    found.schedule.confidence = findRecordedConfidence(found.schedule.names, *recorded.schedule);
   makeRelative(found.inference.ground_velocity, found.part_motions);
   found.ground =
       findGround(found.contacts, parts.parts, found.part_motions, found.inference.ground);

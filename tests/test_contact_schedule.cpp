@@ -15,34 +15,9 @@ namespace {
 
 const double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// A contact that is at a height and moves at a speed, as functions of time say.
-template <class Height, class Speed>
-ContactMotion contactOf(const std::string& name, const VectorXd& time, Height height, Speed speed) {
-  ContactMotion contact{name, Eigen::Matrix3Xd::Zero(3, time.size()),
-                        Eigen::Matrix4Xd::Zero(4, time.size()), VectorXd(time.size()),
-                        Eigen::Matrix3Xd::Zero(3, time.size())};
-  for (Index frame = 0; frame < time.size(); ++frame) {
-    contact.height[frame] = height(time[frame]);
-    contact.velocity(frame % 3, frame) = speed(time[frame]);
-  }
-  return contact;
-}
-
-auto constant(double value) {
-  return [value](double) { return value; };
-}
-
 /// A hundred frames a second.
 VectorXd timeOf(Index frames) {
   return VectorXd::LinSpaced(frames, 0., 0.01 * static_cast<double>(frames - 1));
-}
-
-/// The frames in which a schedule's only contact is active, as a text of dots and hashes.
-std::string drawn(const ContactSchedule& schedule) {
-  std::string text;
-  for (Index frame = 0; frame < schedule.active.cols(); ++frame)
-    text += schedule.active(0, frame) ? '#' : '.';
-  return text;
 }
 
 }  // namespace
@@ -117,158 +92,26 @@ BOOST_AUTO_TEST_CASE(contacts_are_where_pinocchio_says_and_move_as_their_places_
       throws<std::invalid_argument>([&] { computeContactMotions(robot, motion); }, {"v", "3"}));
 }
 
-BOOST_AUTO_TEST_CASE(a_contact_begins_low_and_slow_and_ends_high_or_fast) {
-  DetectionSettings settings;
-  settings.height = 0.01;
-  settings.release_height = 0.02;
-  settings.speed = 0.1;
-  settings.release_speed = settings.rest_speed = 0.2;
-  settings.minimal_duration = 0.;
-  const VectorXd time = timeOf(8);
-  const auto detect = [&](const std::vector<double>& heights, const std::vector<double>& speeds,
-                          double ground = 0.) {
-    const auto at = [&](const std::vector<double>& values) {
-      return [&](double t) { return values[static_cast<std::size_t>(std::lround(t / 0.01))]; };
-    };
-    const auto contact = contactOf("foot", time, at(heights), at(speeds));
-    return drawn(detectContacts({contact}, time, VectorXd::Constant(1, ground), settings));
-  };
-  const std::vector<double> low(8, 0.), slow(8, 0.), deep(8, -0.1);
-  BOOST_TEST(detect(low, slow) == "########");
-  BOOST_TEST(detect({0.03, 0.015, 0.01, 0.015, 0.02, 0.021, 0.015, 0.01}, slow) == "..###..#");
-  BOOST_TEST(detect(low, {0.3, 0.15, 0.1, 0.15, 0.2, 0.21, 0.15, 0.1}) == "..###..#");
-  // Both must hold to begin, and one is enough to end.
-  BOOST_TEST(detect({0., 0., 0.03, 0.03, 0., 0., 0., 0.}, {0., 0., 0., 0., 0.3, 0.3, 0., 0.}) ==
-             "##....##");
-  // Heights are those above the ground; below it is no higher than it.
-  BOOST_TEST(detect(low, slow, -0.05) == "........");
-  BOOST_TEST(detect(deep, slow) == "########");
-}
-
-BOOST_AUTO_TEST_CASE(a_contact_is_at_rest_at_both_ends) {
-  DetectionSettings settings;
-  settings.speed = settings.release_speed = 1.;
-  settings.rest_speed = 0.1;
-  settings.minimal_duration = 0.;
-  const auto detect = [&](const std::vector<double>& speeds) {
-    const VectorXd time = timeOf(static_cast<Index>(speeds.size()));
-    const auto speed = [&](double t) {
-      return speeds[static_cast<std::size_t>(std::lround(t / 0.01))];
-    };
-    return drawn(detectContacts({contactOf("foot", time, constant(0.), speed)}, time,
-                                VectorXd::Zero(1), settings));
-  };
-  BOOST_TEST(detect({2., 0.5, 0.1, 0., 0.5, 0., 0., 0., 0., 0.11, 2.}) == "..#######..");
-  // What is never quite at rest may move three times as fast as it mostly does.
-  BOOST_TEST(detect({2., 0.61, 0.6, 0.2, 0.2, 0.2, 0.2, 0.2, 0.6, 2.}) == "..#######.");
-  // Nobody knows what was before the beginning and what comes after the end.
-  BOOST_TEST(detect({0.5, 0.5, 0., 0., 0., 0., 0.5, 0.5}) == "########");
-  // And what is left may be too short.
-  BOOST_TEST(detect({2., 0.9, 0.9, 0., 0., 0., 0., 2., 2., 2.}) == "...####...");
-  settings.minimal_duration = 0.05;
-  BOOST_TEST(detect({2., 0.9, 0.9, 0., 0., 0., 0., 2., 2., 2.}) == "..........");
-}
-
-BOOST_AUTO_TEST_CASE(what_is_too_short_is_none) {
-  DetectionSettings settings;
-  settings.height = settings.release_height = 0.5;
-  settings.minimal_duration = 0.03;
-  const auto detect = [&](const std::string& touching) {
-    const VectorXd time = timeOf(static_cast<Index>(touching.size()));
-    const auto height = [&](double t) {
-      return touching[static_cast<std::size_t>(std::lround(t / 0.01))] == '#' ? 0. : 1.;
-    };
-    const auto contact = contactOf("foot", time, height, constant(0.));
-    return drawn(detectContacts({contact}, time, VectorXd::Zero(1), settings));
-  };
-  BOOST_TEST(detect("....###....") == "....###....");
-  BOOST_TEST(detect("....##.....") == "...........");
-  // 0.43 − 0.33 is a little less than 0.1.
-  settings.minimal_duration = 0.1;
-  const std::string late = std::string(33, '.') + std::string(10, '#') + "...";
-  BOOST_TEST(detect(late) == late);
-  settings.minimal_duration = 0.03;
-  BOOST_TEST(detect("####...####") == "####...####");
-  BOOST_TEST(detect("####..#####") == "###########");
-  // Interruptions are mended first.
-  BOOST_TEST(detect("...##.##...") == "...#####...");
-  // At the ends, nobody knows how long it was.
-  BOOST_TEST(detect("##.........") == "##.........");
-  BOOST_TEST(detect("..#########") == "..#########");
-  BOOST_TEST(detect("#") == "#");
-}
-
-BOOST_AUTO_TEST_CASE(the_ground_is_where_contacts_are_slow) {
-  Random random(2);
-  const VectorXd time = timeOf(1000);
-  // Up and down, and up to noise on the ground in between.
-  const auto swinging = [&](double ground, double phase) {
-    const auto height = [=, &random](double t) {
-      return ground + std::max(0., 0.2 * std::sin(3. * t + phase)) + random.uniform(0., 0.004);
-    };
-    const auto speed = [=](double t) { return std::sin(3. * t + phase) > 0. ? 1. : 0.02; };
-    return contactOf("foot", time, height, speed);
-  };
-  // Frames of feet that differ, a foot on a step, and one that is never slow.
-  std::vector<ContactMotion> contacts = {swinging(0.1, 0.), swinging(0.12, 2.), swinging(0.3, 1.)};
-  contacts.push_back(contactOf("hand", time, constant(0.15), constant(0.4)));
-  VectorXd ground = estimateGround(contacts, time);
-  BOOST_REQUIRE(ground.size() == 4);
-  BOOST_TEST(close(ground[0], 0.1, 0.004));
-  BOOST_TEST(close(ground[1], 0.12, 0.004));
-  BOOST_TEST(close(ground[2], 0.3, 0.004));
-  BOOST_TEST(ground[3] == ground[0]);
-
-  // Slow in the air, but never still, is not on a step.
-  contacts[2] = contactOf("foot", time, constant(0.3), constant(0.15));
-  ground = estimateGround(contacts, time);
-  BOOST_TEST(ground[2] == ground[0]);
-  // Still for a moment only.
-  contacts[2] = contactOf("foot", time, constant(0.3),
-                          [](double t) { return std::abs(t - 5.) < 0.04 ? 0. : 0.15; });
-  ground = estimateGround(contacts, time);
-  BOOST_TEST(ground[2] == ground[0]);
-
-  DetectionSettings settings;
-  settings.ground_height = -0.25;
-  BOOST_TEST(close(estimateGround(contacts, time, settings), VectorXd::Constant(4, -0.25), 0.));
-  // Where nothing ever is slow, the lowest place of all.
-  contacts = {contactOf(
-                  "foot", time, [](double t) { return t; }, constant(3.)),
-              contactOf(
-                  "hand", time, [](double t) { return 2. - 0.1 * t; }, constant(3.))};
-  BOOST_TEST(close(estimateGround(contacts, time), VectorXd::Zero(2), 0.));
-  BOOST_TEST(estimateGround({}, time).size() == 0);
-}
-
-BOOST_AUTO_TEST_CASE(settings_and_sizes_are_checked) {
-  const VectorXd time = timeOf(4);
-  const std::vector<ContactMotion> contacts = {contactOf("foot", time, constant(0.), constant(0.))};
-  const VectorXd ground = VectorXd::Zero(1);
+BOOST_AUTO_TEST_CASE(a_schedule_is_checked) {
+  ContactSchedule schedule{{"left", "right"}, ContactSchedule::Matrix::Constant(2, 5, true)};
+  schedule.validate(5);
+  schedule.confidence = MatrixXd::Constant(2, 5, 0.5);
+  schedule.readiness = MatrixXd::Constant(2, 5, 1.);
+  schedule.validate(5);
   const auto refused = [&](auto change, std::initializer_list<std::string> words) {
-    DetectionSettings settings;
-    change(settings);
-    BOOST_TEST(throws<std::invalid_argument>([&] { settings.validate(); }, words));
-    BOOST_TEST(
-        throws<std::invalid_argument>([&] { estimateGround(contacts, time, settings); }, words));
-    BOOST_TEST(throws<std::invalid_argument>(
-        [&] { detectContacts(contacts, time, ground, settings); }, words));
+    ContactSchedule wrong = schedule;
+    change(wrong);
+    BOOST_TEST(throws<std::invalid_argument>([&] { wrong.validate(5); }, words));
   };
-  refused([](auto& s) { s.height = -0.25; }, {"DetectionSettings.height", "-0.25"});
-  refused([](auto& s) { s.speed = kNaN; }, {"DetectionSettings.speed", "nan"});
-  refused([](auto& s) { s.release_height = 0.001; }, {"DetectionSettings.release_height", "0.001"});
-  refused([](auto& s) { s.release_speed = 0.001; }, {"DetectionSettings.release_speed", "0.001"});
-  refused([](auto& s) { s.rest_speed = -1.; }, {"DetectionSettings.rest_speed", "-1"});
-  refused([](auto& s) { s.minimal_duration = -1.; }, {"DetectionSettings.minimal_duration", "-1"});
-  refused([](auto& s) { s.ground_height = 1. / 0.; }, {"DetectionSettings.ground_height", "inf"});
-  refused([](auto& s) { s.same_ground = -1.; }, {"DetectionSettings.same_ground", "-1"});
-  BOOST_TEST(throws<std::invalid_argument>([&] { detectContacts(contacts, timeOf(5), ground); },
-                                           {"height", "5", "4"}));
-  BOOST_TEST(throws<std::invalid_argument>(
-      [&] { detectContacts(contacts, time, VectorXd::Zero(2)); }, {"ground", "1", "2"}));
-  DetectionSettings one, other;
-  BOOST_TEST((one == other));
-  other.same_ground = 1.;
-  BOOST_TEST((one != other));
-  BOOST_TEST(mentions(other.to_string(), "same_ground"));
+  refused([](auto& s) { s.names[1] = "left"; }, {"left", "twice"});
+  refused([](auto& s) { s.names.pop_back(); }, {"active", "contacts"});
+  refused([](auto& s) { s.active.resize(2, 4); }, {"active", "5", "frames", "4"});
+  refused([](auto& s) { s.confidence.resize(3, 5); }, {"confidence", "contacts", "3"});
+  refused([](auto& s) { s.confidence.resize(2, 6); }, {"confidence", "frames", "6"});
+  refused([](auto& s) { s.readiness.resize(1, 5); }, {"readiness", "contacts", "1"});
+  refused([](auto& s) { s.readiness.resize(2, 1); }, {"readiness", "frames", "1"});
+  for (const double value : {-0.25, 1.25, kNaN})
+    refused([&](auto& s) { s.confidence(1, 3) = value; }, {"confidence", ">=", "frame 3"});
+  for (const double value : {0., -0.25, 1.25, kNaN})
+    refused([&](auto& s) { s.readiness(1, 3) = value; }, {"readiness", ">", "frame 3"});
 }

@@ -22,8 +22,9 @@ struct Stance {
 struct DYNACOM_EXPORT ContactInference {
   ContactSchedule schedule;  ///< of the parts, with confidence and readiness
   std::vector<Stance> stances;
-  /// Height of the ground under each part, parts × frames [m]: that of the stance to which a frame
-  /// belongs, where that is on the ground; NaN where there is none.
+  /// Height of the ground under each part, parts × frames [m]: of the stance that a frame is in, or
+  /// in which the part is active; on the way from one stance to the next the lower one's. NaN where
+  /// there is none on the ground.
   Eigen::MatrixXd ground;
   /// Velocity of the ground, as given or found, in the world [m/s].
   Eigen::Vector3d ground_velocity = Eigen::Vector3d::Zero();

@@ -23,7 +23,8 @@ struct DYNACOM_EXPORT ContactSchedule {
   /// divided by √ρ. names.size() × frames, or nothing for 1.
   Eigen::MatrixXd readiness = {};
 
-  /// @throws std::invalid_argument if a name is there twice, or a matrix has another size
+  /// @throws std::invalid_argument if a name is there twice, or a matrix has another size or a
+  ///         number out of its range
   void validate(Eigen::Index frames) const;
 };
 

@@ -162,7 +162,7 @@ constexpr Eigen::Index kMinimalFrames = 6;
 /// @param recorded  the same before any filter: jumps are looked for in its q, and its v and a say
 ///                  whether the motion's are recorded ones
 /// @param ground    height of the ground under each contact, contacts × frames, or contacts × 1
-///                  where it does not change, see estimateGround() [m]; NaN where it is not known
+///                  where it does not change, see ContactInference [m]; NaN where it is not known
 /// @param analysis  of analyzeMotion() for the same robot and motion
 /// @param threads   as AnalysisSettings::threads
 /// @param unsure    frames whose accelerations are not known; empty if there are none

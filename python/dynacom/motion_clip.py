@@ -120,6 +120,20 @@ def clip_from_configurations(
     return Clip(path, time, q, v, a, given, schedule, forces or {}, error, tuple(notes))
 
 
+def schedule_from_masks(names: Sequence[str], masks: np.ndarray) -> ContactSchedule:
+    """When contacts are active, and how probable that is.
+
+    Args:
+        names: of C contacts.
+        masks: (T, C), bool, or numbers from 0 to 1: a contact is active from one half on, and if
+            there are others than 0 and 1, they are its confidence.
+    """
+    active = masks >= 0.5 if masks.dtype.kind != "b" else masks
+    if np.array_equal(active, masks):
+        return ContactSchedule(names, active)
+    return ContactSchedule(names, active, masks.astype(float))
+
+
 def check_contacts(path: Path, robot: Robot, names: Sequence[str]) -> None:
     """Refuses contacts that the robot does not have, or that are there twice.
 

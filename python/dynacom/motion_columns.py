@@ -14,7 +14,14 @@ import numpy as np
 from dynacom.dynacom_pywrap import ContactSchedule
 from dynacom.errors import DynacomError
 from dynacom.motion_checks import check_finite, make_time
-from dynacom.motion_clip import Clip, Options, check_contacts, clip_from_joints, is_point
+from dynacom.motion_clip import (
+    Clip,
+    Options,
+    check_contacts,
+    clip_from_joints,
+    is_point,
+    schedule_from_masks,
+)
 from dynacom.motion_joints import match_joints
 from dynacom.robots import Robot
 
@@ -105,15 +112,15 @@ def _read_contacts(
     robot: Robot, table: _Table, columns: Sequence[str]
 ) -> tuple[ContactSchedule | None, dict[str, np.ndarray]]:
     """The schedule, if there, and forces by contact."""
-    active: dict[str, np.ndarray] = {}
+    masks: dict[str, np.ndarray] = {}
     components: dict[str, dict[str, str]] = {}
     for column in columns:
         match = _CONTACT.fullmatch(column)
         if match["what"] == "active":
-            active[match["name"]] = _switch(table, column)
+            masks[match["name"]] = _mask(table, column)
         else:
             components.setdefault(match["name"], {})[match["what"]] = column
-    check_contacts(table.path, robot, [*active])
+    check_contacts(table.path, robot, [*masks])
     check_contacts(table.path, robot, [*components])
     forces = {}
     for name, by_component in components.items():
@@ -124,7 +131,7 @@ def _read_contacts(
             if key not in by_component:
                 raise DynacomError(f"{table.path}: missing column 'contact.{name}.{key}'")
         forces[name] = table.take([by_component[key] for key in wanted])
-    schedule = ContactSchedule([*active], np.stack([*active.values()], 1)) if active else None
+    schedule = schedule_from_masks([*masks], np.stack([*masks.values()], 1)) if masks else None
     return schedule, forces
 
 
@@ -136,14 +143,14 @@ def _find_root(path: Path, columns: Mapping[str, np.ndarray], name: str) -> str:
     return found[0]
 
 
-def _switch(table: _Table, column: str) -> np.ndarray:
-    """A column of 0 and 1, (T,) of bool."""
+def _mask(table: _Table, column: str) -> np.ndarray:
+    """A column of numbers from 0 to 1, (T,)."""
     values = table.take([column])[:, 0]
-    wrong = (values != 0.0) & (values != 1.0)
+    wrong = (values < 0.0) | (values > 1.0)
     if wrong.any():
         frame = int(np.argmax(wrong))
         raise DynacomError(
-            f"{table.path}: {table.label(column)} must be 0 or 1, got {values[frame]:g} in frame "
-            f"{frame}"
+            f"{table.path}: {table.label(column)} must be from 0 to 1, got {values[frame]:g} in "
+            f"frame {frame}"
         )
-    return values == 1.0
+    return values

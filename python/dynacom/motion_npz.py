@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from dynacom.dynacom_pywrap import ContactSchedule
 from dynacom.errors import DynacomError
 from dynacom.motion_bodies import (
     BodySample,
@@ -32,6 +31,7 @@ from dynacom.motion_clip import (
     clip_from_configurations,
     clip_from_joints,
     is_point,
+    schedule_from_masks,
 )
 from dynacom.motion_joints import (
     joint_counts,
@@ -108,11 +108,15 @@ class _Arrays:
             )
         return tuple(array.tolist())
 
-    def booleans(self, name: str, *shape: int) -> np.ndarray:
-        """An array of bool."""
-        array = self._take(name, "b", "bool")
+    def masks(self, name: str, *shape: int) -> np.ndarray:
+        """An array of bool, or of numbers from 0 to 1."""
+        array = self._take(name, "biuf", "bool or numbers")
         if array.shape != shape:
             raise DynacomError(f"{self._path}: {name} must have shape {shape}, got {array.shape}")
+        if not ((array >= 0) & (array <= 1)).all():
+            check_finite(self._path, name, array)
+            wrong = array[(array < 0) | (array > 1)]
+            raise DynacomError(f"{self._path}: {name} must be from 0 to 1, got {wrong[0]:g}")
         return array
 
     def _take(self, name: str, kinds: str, expected: str) -> np.ndarray:
@@ -151,7 +155,7 @@ def _read_plain(path: Path, robot: Robot, arrays: _Arrays, options: Options) -> 
     if any(name in arrays for name in ("contacts", "contact_names", "contact_wrenches")):
         names = arrays.texts("contact_names")
         check_contacts(path, robot, names)
-        schedule = ContactSchedule(names, arrays.booleans("contacts", frames, len(names)))
+        schedule = schedule_from_masks(names, arrays.masks("contacts", frames, len(names)))
     if "contact_wrenches" in arrays:
         wrenches = arrays.numbers("contact_wrenches", frames, len(names), 6)
         framed = "contact_frames" in arrays

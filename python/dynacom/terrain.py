@@ -12,8 +12,9 @@ from dynacom.robots import Robot
 _FAR_FROM_ZERO = 0.1
 # Stances that differ by more than this stand on different levels [m].
 _LEVEL = 0.05
-# A slope is told from this angle on [deg], if the stances are no farther from the plane [m].
-_SLOPE, _PLANE = 1.0, 0.02
+# A slope is told from this angle [deg] and this difference of heights on [m], if no stance is
+# farther from the plane than this [m] and this part of the difference.
+_SLOPE, _RISE, _PLANE, _PLANE_PART = 1.0, 0.02, 0.02, 0.2
 # A foot that is held in the air is worth a word after so long [s].
 _HELD = 0.5
 # Schedules that differ in more of the frames than this are worth a word.
@@ -41,7 +42,8 @@ def terrain_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
     velocity = found.inference.ground_velocity
     if velocity.any():
         yield (
-            f"The ground moves by ({velocity[0]:.2f}, {velocity[1]:.2f}) m/s: a treadmill. Speeds "
+            f"The ground moves by ({_text(velocity[0], 2)}, {_text(velocity[1], 2)}) m/s: a "
+            "treadmill. Speeds "
             "of contacts are relative to it; --ground-velocity says another."
         )
     if not heights:
@@ -54,6 +56,11 @@ def terrain_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
         yield from _level_texts(robot, found, known)
     yield from _held_texts(robot, found)
     yield from _disagreement_texts(found)
+
+
+def _text(value: float, digits: int) -> str:
+    """A number without the sign of what is rounded to zero."""
+    return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
 def _name(robot: Robot, found: MotionExamination, stance: Stance) -> str:
@@ -75,13 +82,13 @@ def _slope_text(found: MotionExamination) -> str | None:
         position = found.part_motions[stance.part].position[stance.first : stance.behind]
         points.append([*position[:, :2].mean(axis=0), stance.height])
     points = np.array(points).reshape(-1, 3)
-    if len(points) < 6 or np.ptp(points[:, 2]) <= _LEVEL:
+    if len(points) < 6 or np.ptp(points[:, 2]) <= _RISE:
         return None
     centred = points - points.mean(axis=0)
     gradient, *_ = np.linalg.lstsq(centred[:, :2], centred[:, 2], rcond=None)
     off = centred[:, 2] - centred[:, :2] @ gradient
     angle = np.degrees(np.arctan(np.linalg.norm(gradient)))
-    if angle < _SLOPE or np.abs(off).max() > _PLANE:
+    if angle < _SLOPE or np.abs(off).max() > min(_PLANE, _PLANE_PART * np.ptp(points[:, 2])):
         return None
     towards = np.degrees(np.arctan2(gradient[1], gradient[0]))
     return (
@@ -99,26 +106,28 @@ def _level_texts(robot: Robot, found: MotionExamination, known: dict[str, float]
     steps = []
     for name, own in levels.items():
         if len(own) > 1:
-            *first, last = (f"{height:.2f}" for height in sorted(own))
+            *first, last = (_text(height, 2) for height in sorted(own))
             steps.append(f"{name} stands at {', '.join(first)} and {last} m")
     if steps:
         yield f"{'; '.join(steps)}: steps or stairs."
     else:
-        text = ", ".join(f"{name} {height:.3f} m" for name, height in known.items())
+        text = ", ".join(f"{name} {_text(height, 3)} m" for name, height in known.items())
         yield f"Height of the ground: {text}."
     if min(abs(height) for height in known.values()) > _FAR_FROM_ZERO:
         yield "The ground is not near the height 0: is it this robot's motion?"
 
 
 def _held_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
-    """Feet that are at rest where nothing was seen to carry them."""
-    time = found.analysis.time
+    """Feet that are at rest where nothing was seen to carry them, none of their corners."""
+    time, active = found.analysis.time, np.asarray(found.schedule.active)
     lowest: dict[str, tuple[float, Stance]] = {}
     on_ground = [stance.height for stance in _used(found)]
     for stance in found.inference.stances:
         lasts = time[stance.behind - 1] - time[stance.first]
         name = _name(robot, found, stance)
         if stance.on_ground or lasts < _HELD:
+            continue
+        if active[stance.first : stance.behind, found.parts[stance.part].contact].all():
             continue
         if name not in lowest or stance.height < lowest[name][0]:
             lowest[name] = (stance.height, stance)

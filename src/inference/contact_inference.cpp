@@ -44,6 +44,24 @@ Eigen::MatrixXd findReadiness(const ContactSchedule::Matrix& active, const Eigen
   return readiness;
 }
 
+// Under a point: of the rest that it is in, or on which it is active; on its way from one to the
+// next of the lower one, because nobody knows where a step begins.
+double findGround(const internal::Rests& rests, Index frame, bool active) {
+  const int owner = rests.owner[static_cast<std::size_t>(frame)];
+  if (owner < 0) return kNaN;
+  const auto at = static_cast<std::size_t>(owner);
+  const internal::Rest& rest = rests.list[at];
+  const auto heightOf = [](const internal::Rest& other) {
+    return other.on_ground ? other.height : kNaN;
+  };
+  if (active) return rest.height;
+  double height = heightOf(rest);
+  if (frame < rest.first && at > 0) height = std::fmin(height, heightOf(rests.list[at - 1]));
+  if (frame >= rest.behind && at + 1 < rests.list.size())
+    height = std::fmin(height, heightOf(rests.list[at + 1]));
+  return height;
+}
+
 internal::KnownContacts findKnown(const PartRobot& parts, const ContactSchedule& recorded,
                                   Index frames) {
   recorded.validate(frames);
@@ -128,11 +146,8 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
     found.schedule.names.push_back(parts.parts[k].name);
     for (Index frame = 0; frame < frames; ++frame) {
       found.schedule.active(Index(k), frame) = path.sets[static_cast<std::size_t>(frame)] >> k & 1u;
-      const int owner = rests[k].owner[static_cast<std::size_t>(frame)];
-      if (owner < 0) continue;
-      const internal::Rest& rest = rests[k].list[static_cast<std::size_t>(owner)];
-      if (rest.on_ground || found.schedule.active(Index(k), frame))
-        found.ground(Index(k), frame) = rest.height;
+      found.ground(Index(k), frame) =
+          findGround(rests[k], frame, found.schedule.active(Index(k), frame));
     }
     for (const internal::Rest& rest : rests[k].list)
       found.stances.push_back({k, rest.first, rest.behind, rest.height, rest.on_ground});

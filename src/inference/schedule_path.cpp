@@ -420,7 +420,8 @@ Eigen::MatrixXd PathFinder::findProbability() const {
       for (Mask rest = sets.mask(k); rest != 0; rest &= rest - 1)
         probability(__builtin_ctz(rest), Index(frame)) += value;
     }
-    if (sum > 0.) probability.col(Index(frame)) /= sum;
+    if (sum > 0.)
+      probability.col(Index(frame)) = (probability.col(Index(frame)) / sum).cwiseMin(1.);
   }
   return probability;
 }

@@ -286,8 +286,16 @@ def documentation(function: object) -> list[str]:
     return [part.strip().removeprefix(":").strip() for part in parts[1:]]
 
 
+#: What the parts of a sole are called.
+CORNERS = ("front_left", "front_right", "rear_left", "rear_right")
+
+
 def documented_columns(root: Path, contacts: Sequence[str]) -> dict[str, str]:
-    """The names in docs/columns.md, in its order, with their units as in Parquet's metadata."""
+    """The names in docs/columns.md, in its order, with their units as in Parquet's metadata.
+
+    Args:
+        contacts: names of soles.
+    """
     text = (root / "docs" / "columns.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (`.*?`) \| (.*?) ?\|", text, flags=re.MULTILINE)
     units = {
@@ -299,7 +307,8 @@ def documented_columns(root: Path, contacts: Sequence[str]) -> dict[str, str]:
     frame = {name: unit for name, unit in units.items() if name not in per_contact}
     assert list(units) == [*frame, *per_contact]
     return frame | {
-        name.replace("<name>", contact): unit
+        name.replace("<name>", contact).replace("<part>", part): unit
         for contact in contacts
         for name, unit in per_contact.items()
+        for part in (CORNERS if "<part>" in name else [""])
     }

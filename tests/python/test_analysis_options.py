@@ -48,8 +48,8 @@ def test_defaults(options):
     assert options.verdict == VerdictSettings()
     options.validate()
     # Each has its own.
-    options.detection.height = 0.02
-    assert AnalysisOptions().detection.height == 0.015
+    options.detection.change = 3.0
+    assert AnalysisOptions().detection.change == DetectionSettings().change != 3.0
 
 
 def test_a_file(options, tmp_path):
@@ -57,7 +57,7 @@ def test_a_file(options, tmp_path):
     path.write_text("""
 cutoff: 8
 flat: false
-detection: {height: 0.02, ground_height: -0.1}
+detection: {change: 3, ground_height: -0.1, ground_velocity: [-1, 0.5, 0]}
 verdict:
   residual_force: {limit: 2e-1, allowed_share: 0.5}
   foot_sliding: {limit: 1}
@@ -67,8 +67,9 @@ verdict:
     assert changes(options) == {
         "cutoff": 8.0,
         "flat": False,
-        "detection.height": 0.02,
+        "detection.change": 3.0,
         "detection.ground_height": -0.1,
+        "detection.ground_velocity": [-1.0, 0.5, 0.0],
         "verdict.residual_force.limit": 0.2,
         "verdict.residual_force.allowed_share": 0.5,
         "verdict.foot_sliding.limit": 1.0,
@@ -76,6 +77,7 @@ verdict:
     }
     assert options.verdict.residual_force == FaultLimit(0.2, 0.5)
     assert options.detection.ground_height == -0.1
+    assert options.detection.ground_velocity.tolist() == [-1.0, 0.5, 0.0]
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "{}"])
@@ -109,17 +111,24 @@ def test_every_setting_can_be_set_by_a_text():
         return found
 
     every = paths(AnalysisOptions().to_dict())
-    assert len(every) == 3 + 8 + 2 * 7 + 7
+    constants = len(every) - 2 - 3 - 7 * 2 - 7
+    assert constants == repr(DetectionSettings()).count("=") - 2 > 30
     for path in every:
-        value = False if path == "flat" else 0.51
-        limits = {"detection.height": "release_height", "detection.speed": "release_speed"}
-        if path in limits:
-            options = AnalysisOptions()
-            options.update_from_texts([f"{path}=0.51", f"detection.{limits[path]}=0.6"])
-            assert changes(options)[path] == 0.51
-        else:
-            text = f"{path}={str(value).lower()}"
-            assert changes(from_text(text)) == {path: value}
+        value, text = 0.51, "0.51"
+        if path == "flat":
+            value, text = False, "false"
+        elif path.endswith("ground_velocity"):
+            value, text = [1.0, -0.5, 0.0], "[1, -0.5, 0]"
+        # What has a least must not be less than it, and the other way round.
+        texts = [f"{path}={text}"]
+        for end, other, bound in (("_least", "_greatest", "0.6"), ("_greatest", "_least", "0.001")):
+            if path.endswith(end) and path.replace(end, other) in every:
+                texts.append(f"{path.replace(end, other)}={bound}")
+        options = AnalysisOptions()
+        options.update_from_texts(texts)
+        found = changes(options)
+        assert found[path] == value
+        assert len(found) <= len(texts)
 
 
 @pytest.mark.parametrize(
@@ -131,8 +140,8 @@ def test_every_setting_can_be_set_by_a_text():
         ("cutoff=auto", {}),
         ("flat=no", {"flat": False}),
         (
-            "detection={height: 0.01, rest_speed: 1}",
-            {"detection.height": 0.01, "detection.rest_speed": 1.0},
+            "detection={change: 0.01, rate: 1}",
+            {"detection.change": 0.01, "detection.rate": 1.0},
         ),
         ("verdict.cop_force=0", {"verdict.cop_force": 0.0}),
         ("verdict.discontinuity={limit: 2}", {"verdict.discontinuity.limit": 2.0}),
@@ -162,11 +171,12 @@ def test_null_is_the_ground_that_is_estimated(options):
 
 def test_ranges_are_looked_at_when_all_is_set(options):
     """One setting may need another, whichever comes first."""
-    texts = ["detection.height=0.1", "detection.release_height=0.2"]
+    texts = ["detection.speed_scale_least=1", "detection.speed_scale_greatest=2"]
     for order in (texts, texts[::-1]):
         options = AnalysisOptions()
         options.update_from_texts(order)
-        assert (options.detection.height, options.detection.release_height) == (0.1, 0.2)
+        found = options.detection.speed_scale_least, options.detection.speed_scale_greatest
+        assert found == (1.0, 2.0)
 
 
 def test_the_last_counts(options):
@@ -185,7 +195,7 @@ def test_the_last_counts(options):
         ("", ["setting must be NAME=VALUE", "got ''"]),
         ("=3", ["setting '=3'", "unknown setting ''", "cutoff, omega, flat, detection, verdict"]),
         ("speed=3", ["setting 'speed=3'", "unknown setting 'speed'", "expected cutoff"]),
-        ("detection.mu=3", ["detection: unknown setting 'mu'", "expected height, speed"]),
+        ("detection.mu=3", ["detection: unknown setting 'mu'", "expected rest_speed_part"]),
         ("verdict.feasible=3", ["verdict: unknown setting 'feasible'", "residual_force"]),
         ("verdict.cop_outside.share=3", ["cop_outside: unknown", "expected limit, allowed_share"]),
         ("cutoff=six", ["cutoff must be a finite number, auto or null", "got 'six'"]),
@@ -199,10 +209,14 @@ def test_the_last_counts(options):
         ("omega=auto", ["omega must be a finite number, got 'auto'"]),
         ("omega=null", ["omega must be a finite number", "got None"]),
         ("flat=1", ["flat must be true or false", "got 1"]),
-        ("detection=3", ["detection: must be a mapping with height, speed", "got 3"]),
-        ("detection.height=true", ["detection: height must be a finite number", "got True"]),
-        ("detection.height=-1", ["settings: DetectionSettings.height must be", "got -1"]),
-        ("detection.height=1", ["settings: DetectionSettings.release_height must be", "got 0.03"]),
+        ("detection=3", ["detection: must be a mapping with rest_speed_part", "got 3"]),
+        ("detection.rate=true", ["detection: rate must be a finite number", "got True"]),
+        ("detection.rate=-1", ["settings: DetectionSettings.rate must be", "got -1"]),
+        ("detection.force_scale_least=1", ["DetectionSettings.force_scale_greatest must be >="]),
+        ("detection.ground_velocity=1", ["detection: ground_velocity must be", "got 1"]),
+        ("detection.ground_velocity=[1, 0]", ["ground_velocity must be", "got [1, 0]"]),
+        ("detection.ground_velocity=[1, 0, x]", ["ground_velocity must be", "got [1, 0, 'x']"]),
+        ("detection.ground_velocity=[1, 0, 1]", ["ground_velocity must be finite and level"]),
         ("detection.ground_height=.nan", ["ground_height must be a finite number or null", "nan"]),
         ("verdict.cop_outside=1", ["verdict: cop_outside: must be a mapping with limit", "got 1"]),
         ("verdict.cop_outside.limit=-1", ["VerdictSettings.cop_outside.limit must be", "got -1"]),
@@ -228,7 +242,7 @@ def test_errors_name_the_thing_and_change_nothing(options, text, parts):
         ("1: 2", ["unknown setting 1", "expected cutoff"]),
         ("cutoff: 1\ncutoff: 2", ["must be YAML", "'cutoff' twice"]),
         ("omega: 2\nverdict: {foot_sliding: {limit: x}}", ["verdict: foot_sliding: limit", "'x'"]),
-        ("omega: 2\ndetection: {speed: 9}", ["DetectionSettings.release_speed must be"]),
+        ("omega: 2\ndetection: {rate: 0}", ["DetectionSettings.rate must be finite and > 0"]),
         ("omega: 2\nverdict:", ["verdict: must be a mapping with", "got None"]),
     ],
 )
@@ -254,14 +268,14 @@ def test_files_that_cannot_be_read(options, tmp_path):
         ("cutoff", np.nan, "cutoff must be finite and >= 0 Hz, auto or none, got nan"),
         ("cutoff", "six", "cutoff must be a number of Hz, auto or none, got 'six'"),
         ("omega", np.inf, "omega must be finite and >= 0 rad/s, got inf"),
-        ("detection", None, "DetectionSettings.speed must be finite"),
+        ("detection", None, "DetectionSettings.rate must be finite"),
         ("verdict", None, "VerdictSettings.cop_force must be finite"),
     ],
 )
 def test_analyze_refuses_what_is_out_of_range(options, tmp_path, name, value, message):
     """Before it reads anything, and although the motion has derivatives of its own."""
     if name == "detection":
-        options.detection.speed = -1.0
+        options.detection.rate = -1.0
     elif name == "verdict":
         options.verdict.cop_force = -1.0
     else:

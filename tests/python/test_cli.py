@@ -296,13 +296,13 @@ def test_settings(analyze, tmp_path):
     out, _ = analyze(
         WALK,
         *("--settings", path),
-        *("--set", "omega=2", "--set", "detection.height=0.02"),
+        *("--set", "omega=2", "--set", "detection.change=3"),
         *("--set", "verdict.cop_force=0.2"),
         *("--omega", "3", "--ground-height", "-0.5", "--uneven"),
     )
     options = summary(out)["options"]
     assert (options["cutoff"], options["omega"], options["flat"]) == (3.0, 3.0, False)
-    assert options["detection"]["height"] == 0.02
+    assert options["detection"]["change"] == 3.0
     assert options["detection"]["ground_height"] == -0.5
     assert options["verdict"]["cop_force"] == 0.2
     assert options["verdict"]["cop_outside"] == {"limit": 0.2, "allowed_share": 0.1}

@@ -165,6 +165,20 @@ def test_forces_without_moments_or_schedule(tmp_path, toy):
     np.testing.assert_array_equal(clip.forces["pad"], np.arange(90)[:, None] * [1, 1, 1])
 
 
+def test_fractions_for_active(tmp_path, toy):
+    """A contact is active from one half on; the fractions of all are how sure that is."""
+    masks = np.column_stack([np.linspace(0.0, 1.0, 90), np.arange(90) % 2])
+    columns = sway(toy).columns
+    columns |= {"contact.pad.active": masks[:, 0], "contact.foot.active": masks[:, 1]}
+    clip = read_motion(write_columns(tmp_path / "clip.csv", columns), toy)
+    assert clip.schedule.names == ["pad", "foot"]
+    np.testing.assert_array_equal(clip.schedule.active, masks >= 0.5)
+    np.testing.assert_array_equal(clip.schedule.confidence, masks)
+    del columns["contact.pad.active"]
+    clip = read_motion(write_columns(tmp_path / "clip.csv", columns), toy)
+    assert clip.schedule.confidence is None
+
+
 @pytest.mark.parametrize("words", ["True False", "true false", "1 0", "1.0 0.0", " TRUE False "])
 def test_words_for_active(tmp_path, toy, words):
     yes, no = words.replace(" ", ",").strip(",").split(",")
@@ -186,8 +200,12 @@ def test_words_for_active(tmp_path, toy, words):
         ({"contact.hand.active": 1}, "contacts must be those of toy (foot, pad), got 'hand'"),
         ({"contact.hand.force_x": 1}, "contacts must be those of toy (foot, pad), got 'hand'"),
         (
-            {"contact.pad.active": np.where(np.arange(90) == 5, 0.5, 1)},
-            "column 'contact.pad.active' must be 0 or 1, got 0.5 in frame 5",
+            {"contact.pad.active": np.where(np.arange(90) == 5, 1.5, 1)},
+            "column 'contact.pad.active' must be from 0 to 1, got 1.5 in frame 5",
+        ),
+        (
+            {"contact.pad.active": np.where(np.arange(90) == 7, -0.1, 1)},
+            "column 'contact.pad.active' must be from 0 to 1, got -0.1 in frame 7",
         ),
         ({"contact.pad.force_x": 1}, "missing column 'contact.pad.force_y'"),
         ({"contact.pad.torque_y": 1}, "missing column 'contact.pad.force_x'"),

@@ -89,6 +89,25 @@ def test_contacts_and_their_names_come_together(motion_file, talos, name):
     refuses(motion_file(**{name: None}), talos, f"missing array '{name}'")
 
 
+@pytest.mark.parametrize("dtype", [float, np.float32, int])
+def test_masks_of_zeros_and_ones(motion_file, talos, dtype):
+    """Numbers are as good as bool, and say no more."""
+    masks = np.arange(80).reshape(40, 2) % 3 == 0
+    clip = read_motion(motion_file(contacts=masks.astype(dtype)), talos)
+    np.testing.assert_array_equal(clip.schedule.active, masks)
+    assert clip.schedule.confidence is None
+
+
+def test_masks_of_fractions(motion_file, talos):
+    """A contact is active from one half on; the fraction is how sure that is."""
+    masks = np.linspace(0.0, 1.0, 80).reshape(40, 2)
+    masks[0] = 0.5, 0.4999
+    clip = read_motion(motion_file(contacts=masks), talos)
+    np.testing.assert_array_equal(clip.schedule.active, masks >= 0.5)
+    assert clip.schedule.active[0].tolist() == [True, False]
+    np.testing.assert_array_equal(clip.schedule.confidence, masks)
+
+
 def test_missing_arrays(motion_file, talos):
     refuses(motion_file(t=None), talos, "missing array 't', got q, v, a, contacts, contact_names")
     refuses(motion_file(q=None), talos, "missing array 'q', got t, v, a, contacts, contact_names")
@@ -125,7 +144,10 @@ def test_pickled_array_is_not_loaded(motion_file, talos):
         ("t", np.array(["0", "1"]), "must be of real numbers, got <U1"),
         ("q", np.ones((2, 39), dtype=complex), "must be of real numbers, got complex128"),
         ("v", np.ones((2, 38), dtype=bool), "must be of real numbers, got bool"),
-        ("contacts", np.ones((40, 2)), "must be of bool, got float64"),
+        ("contacts", np.full((40, 2), "1"), "must be of bool or numbers, got <U1"),
+        ("contacts", np.full((40, 2), 1.5), "must be from 0 to 1, got 1.5"),
+        ("contacts", np.full((40, 2), -1), "must be from 0 to 1, got -1"),
+        ("contacts", np.full((40, 2), np.nan), "must be finite, got nan in frame 0 of column 0"),
         ("contact_names", np.array([1, 2]), "must be of texts, got int64"),
         ("t", np.ones((40, 1)), "must have shape (T,), got (40, 1)"),
         ("t", np.ones(0), None),

@@ -36,6 +36,11 @@ def test_types_of_columns(tmp_path, toy):
     assert clip.schedule.names == ["pad", "foot"]
     np.testing.assert_array_equal(clip.schedule.active[:, 0], np.arange(90) % 2 == 0)
     np.testing.assert_array_equal(clip.schedule.active[:, 1], np.arange(90) % 2 == 1)
+    assert clip.schedule.confidence is None
+    columns |= {"contact.foot.active": np.linspace(0.0, 1.0, 90)}
+    clip = read_motion(write(tmp_path / "clip.parquet", columns), toy)
+    np.testing.assert_array_equal(clip.schedule.active[:, 1], np.arange(90) >= 45)
+    np.testing.assert_array_equal(clip.schedule.confidence[:, 1], np.linspace(0.0, 1.0, 90))
 
 
 def test_of_pandas(tmp_path, toy):

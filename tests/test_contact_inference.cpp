@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#define BOOST_TEST_MODULE contact_inference
+#include <cmath>
+#include <optional>
+
+#include "dynacom/contact_inference.hpp"
+#include "feet.hpp"
+#include "random_robot.hpp"
+
+using namespace dynacom;
+using namespace dynacom_tests;
+
+namespace {
+
+/// A body of 10 kg, 0.7 m above the soles of two massless feet that go wherever they are put.
+struct Puppet {
+  Puppet() {
+    model = singleBody(10., {});
+    for (const char* name : {"left", "right"}) {
+      const auto joint = model.addJoint(1, pinocchio::JointModelTranslation(), SE3::Identity(),
+                                        std::string(name) + "_joint");
+      model.addFrame(pinocchio::Frame(std::string(name) + "_foot", joint, SE3::Identity(),
+                                      pinocchio::OP_FRAME));
+    }
+    robot.emplace(model);
+    for (const char* name : {"left", "right"})
+      robot->addContact(makeSole(std::string(name) + "_foot"), name);
+    split.emplace(splitContacts(*robot));
+  }
+
+  /// Stands above the middle between its feet, except that the right foot is up to so high for the
+  /// middle third of the time, while the body is above the left one.
+  Motion step(double height, Index frames = 301) const {
+    Motion motion{VectorXd::LinSpaced(frames, 0., 0.01 * double(frames - 1)),
+                  MatrixXd::Zero(model.nq, frames), MatrixXd::Zero(model.nv, frames),
+                  MatrixXd::Zero(model.nv, frames)};
+    motion.q.row(2).setConstant(0.7);
+    motion.q.row(6).setOnes();
+    motion.q.middleRows(7, 6).colwise() = (Vector6() << 0., 0.1, -0.7, 0., -0.1, -0.7).finished();
+    const double third = motion.time[frames - 1] / 3.;
+    const double pi = std::acos(-1.);
+    for (Index frame = 0; frame < frames; ++frame) {
+      const double part = (motion.time[frame] - third) / third;
+      if (height == 0.) continue;
+      // Nothing here asks how the body gets to the left foot and back.
+      motion.q(1, frame) = part > -0.3 && part < 1.3 ? 0.1 : 0.;
+      motion.q(8, frame) -= motion.q(1, frame);
+      motion.q(11, frame) -= motion.q(1, frame);
+      if (part <= 0. || part >= 1.) continue;
+      motion.q(12, frame) += height * std::pow(std::sin(pi * part), 2);
+      motion.v(11, frame) = height * pi / third * std::sin(2. * pi * part);
+    }
+    return motion;
+  }
+
+  ContactInference infer(const Motion& motion, const DetectionSettings& settings = {},
+                         const ContactSchedule* recorded = nullptr) const {
+    const auto motions = computeContactMotions(split->robot, motion);
+    ContactSchedule none;
+    none.active.resize(0, motion.frames());
+    return inferContacts(*split, motions, analyzeMotion(split->robot, motion, none), true, settings,
+                         recorded);
+  }
+
+  ContactSchedule gather(const ContactInference& found) const {
+    return gatherParts(*robot, *split, found.schedule);
+  }
+
+  pinocchio::Model model;
+  std::optional<DynaCoM> robot;
+  std::optional<PartRobot> split;
+};
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(who_stands_is_in_contact_and_a_foot_in_the_air_is_not) {
+  const Puppet puppet;
+  const ContactInference stands = puppet.infer(puppet.step(0.));
+  BOOST_TEST(stands.schedule.active.all());
+  BOOST_TEST(stands.schedule.confidence.minCoeff() > 0.9);
+  BOOST_TEST((stands.schedule.readiness.array() == 1.).all());
+  BOOST_TEST(close(stands.ground, MatrixXd::Zero(8, 301), 1e-12));
+  BOOST_TEST(stands.stances.size() == 8u);
+  BOOST_TEST(stands.ground_velocity == Vector3d::Zero());
+
+  const ContactInference steps = puppet.infer(puppet.step(0.1));
+  const ContactSchedule feet = puppet.gather(steps);
+  BOOST_TEST(feet.active.row(0).all());
+  for (Index frame = 0; frame < 301; ++frame) {
+    const bool up = frame > 100 && frame < 200;
+    if (frame > 110 && frame < 190) BOOST_TEST(!feet.active(1, frame));
+    if (!up) BOOST_TEST(feet.active(1, frame));
+    BOOST_TEST(steps.schedule.confidence.col(frame).minCoeff() >= 0.);
+    BOOST_TEST(steps.schedule.confidence.col(frame).maxCoeff() <= 1.);
+  }
+  for (const Stance& stance : steps.stances) {
+    BOOST_TEST(stance.on_ground);
+    BOOST_TEST(std::abs(stance.height) < 1e-12);
+  }
+  // Loads ramp where contacts begin and end: over a tenth of a second, by up to a fifth.
+  Index last = 100;
+  while (!feet.active(1, last)) --last;
+  while (feet.active(1, last)) ++last;
+  --last;
+  const auto part = static_cast<Index>(4);
+  BOOST_TEST(steps.schedule.readiness(part, last) < 0.4);
+  BOOST_TEST(steps.schedule.readiness(part, last - 15) == 1.);
+}
+
+BOOST_AUTO_TEST_CASE(recorded_contacts_are_kept) {
+  const Puppet puppet;
+  ContactSchedule recorded{{"right", "left"}, ContactSchedule::Matrix::Constant(2, 301, true)};
+  recorded.active.row(0).head(50).setConstant(false);
+  for (const double height : {0., 0.1}) {
+    const ContactInference found = puppet.infer(puppet.step(height), {}, &recorded);
+    const ContactSchedule feet = puppet.gather(found);
+    BOOST_TEST((feet.active.row(0).array() == recorded.active.row(1).array()).all());
+    BOOST_TEST((feet.active.row(1).array() == recorded.active.row(0).array()).all());
+  }
+  // Who is not named is never active.
+  const ContactSchedule left{{"left"}, ContactSchedule::Matrix::Constant(1, 301, true)};
+  BOOST_TEST(!puppet.gather(puppet.infer(puppet.step(0.), {}, &left)).active.row(1).any());
+}
+
+BOOST_AUTO_TEST_CASE(a_plane_that_is_given_is_the_ground) {
+  const Puppet puppet;
+  DetectionSettings settings;
+  settings.ground_height = 0.;
+  const ContactInference found = puppet.infer(puppet.step(0.), settings);
+  BOOST_TEST(found.schedule.active.all());
+  settings.ground_height = -0.2;  // far below both feet
+  const ContactInference above = puppet.infer(puppet.step(0.), settings);
+  BOOST_TEST((above.ground.array() == -0.2).all());
+  settings.ground_velocity << 0.5, 0., 0.;
+  BOOST_TEST(puppet.infer(puppet.step(0.), settings).ground_velocity == Vector3d(0.5, 0., 0.));
+}
+
+BOOST_AUTO_TEST_CASE(what_does_not_fit_is_refused) {
+  const Puppet puppet;
+  const Motion motion = puppet.step(0.1, 30);
+  const auto motions = computeContactMotions(puppet.split->robot, motion);
+  ContactSchedule none;
+  none.active.resize(0, 30);
+  const MotionAnalysis dynamics = analyzeMotion(puppet.split->robot, motion, none);
+  const auto refused = [&](auto change, std::initializer_list<std::string> words) {
+    auto own_motions = motions;
+    auto own_dynamics = dynamics;
+    DetectionSettings settings;
+    ContactSchedule recorded{{"left"}, ContactSchedule::Matrix::Constant(1, 30, true)};
+    change(own_motions, own_dynamics, settings, recorded);
+    BOOST_TEST(throws<std::invalid_argument>(
+        [&] { inferContacts(*puppet.split, own_motions, own_dynamics, true, settings, &recorded); },
+        words));
+  };
+  refused([](auto& m, auto&, auto&, auto&) { m.pop_back(); }, {"motions", "8", "parts", "7"});
+  refused([](auto& m, auto&, auto&, auto&) { m[3].position.conservativeResize(3, 29); },
+          {"motions", "30", "29"});
+  refused([](auto&, auto& d, auto&, auto&) { d.com.conservativeResize(3, 29); },
+          {"dynamics", "30", "29"});
+  refused([](auto&, auto&, auto& s, auto&) { s.rate = -1.; }, {"DetectionSettings.rate", "-1"});
+  refused([](auto&, auto&, auto&, auto& r) { r.active.resize(1, 29); }, {"active", "30", "29"});
+}
+
+BOOST_AUTO_TEST_CASE(more_parts_than_bits_are_refused) {
+  std::vector<SE3> soles(9, SE3::Identity());
+  DynaCoM robot(singleBody(10., soles));
+  for (int k = 0; k < 9; ++k)
+    robot.addContact(makeSole("sole" + std::to_string(k)), std::to_string(k));
+  const PartRobot split = splitContacts(robot);
+  Motion motion{VectorXd::Zero(1), restState(robot.getModel()).q, VectorXd::Zero(6),
+                VectorXd::Zero(6)};
+  ContactSchedule none;
+  none.active.resize(0, 1);
+  const auto motions = computeContactMotions(split.robot, motion);
+  const MotionAnalysis dynamics = analyzeMotion(split.robot, motion, none);
+  BOOST_TEST(throws<std::invalid_argument>([&] { inferContacts(split, motions, dynamics, true); },
+                                           {"32", "36"}));
+}
