@@ -44,6 +44,16 @@ struct DYNACOM_EXPORT DetectionSettings {
   /// the second.
   double same_ground = 0.035, exact_same_ground = 0.01;
 
+  // Links that are no contacts, and so may rest anywhere: see screenBodies().
+
+  /// A link may have touched what was within this below it while contacts could not give what the
+  /// motion needs [m].
+  double body_reach = 0.1;
+  /// Only the ground of a contact, or the lowest rest of all, carries links: what is no higher than
+  /// this above the lowest such level, or within this of another [m]. Having been landed on makes no
+  /// ground for links, since hands come to rest in the air.
+  double body_ground = 0.05;
+
   // Scales.
 
   /// Of heights above the rest: their scatter at rest, between these [m].

@@ -60,10 +60,17 @@ def _name(robot: Robot, found: MotionExamination, stance: Stance) -> str:
     return list(robot.contacts)[found.parts[stance.part].contact]
 
 
+def _stances(found: MotionExamination) -> Iterator[Stance]:
+    """Those of contacts: other links rest anywhere."""
+    for stance in found.inference.stances:
+        if found.parts[stance.part].contact < len(found.contacts):
+            yield stance
+
+
 def _used(found: MotionExamination) -> Iterator[Stance]:
     """The stances in which their part is active at some time."""
     active = np.asarray(found.inference.schedule.active)
-    for stance in found.inference.stances:
+    for stance in _stances(found):
         if stance.on_ground and active[stance.first : stance.behind, stance.part].any():
             yield stance
 
@@ -115,7 +122,7 @@ def _held_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
     time = found.analysis.time
     lowest: dict[str, tuple[float, Stance]] = {}
     on_ground = [stance.height for stance in _used(found)]
-    for stance in found.inference.stances:
+    for stance in _stances(found):
         lasts = time[stance.behind - 1] - time[stance.first]
         name = _name(robot, found, stance)
         if stance.on_ground or lasts < _HELD:

@@ -51,6 +51,7 @@ internal::KnownContacts findKnown(const PartRobot& parts, const ContactSchedule&
   std::vector<std::string> names;
   for (std::size_t k = 0; k < parts.parts.size(); ++k) {
     const std::size_t contact = parts.parts[k].contact;
+    if (contact >= parts.countContacts()) continue;  // nobody records what links do
     if (contact >= known.masks.size()) {
       known.masks.resize(contact + 1, 0);
       names.resize(contact + 1);
@@ -84,13 +85,14 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
   for (const auto* values : {&dynamics.com, &dynamics.ground_force, &dynamics.ground_torque})
     internal::requireSize("dynamics", values->cols(), frames, "frames");
 
+  const std::size_t contacts = parts.countContacts();
   std::vector<internal::PointTrack> tracks;
   tracks.reserve(count);
   const auto addTrack = [&](std::size_t k, const Eigen::Matrix3Xd& velocity) {
     const auto contact = std::dynamic_pointer_cast<const ContactPoint>(
         parts.robot.getContact(parts.parts[k].name));
     tracks.push_back({parts.parts[k].limb, contact ? contact->getSettings().mu : 0.,
-                      motions[k].position, velocity});
+                      parts.parts[k].contact >= contacts, motions[k].position, velocity});
   };
   for (std::size_t k = 0; k < count; ++k) {
     for (const auto* values : {&motions[k].position, &motions[k].velocity})
@@ -132,7 +134,7 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
       const int owner = rests[k].owner[static_cast<std::size_t>(frame)];
       if (owner < 0) continue;
       const internal::Rest& rest = rests[k].list[static_cast<std::size_t>(owner)];
-      if (rest.on_ground || found.schedule.active(Index(k), frame))
+      if ((rest.on_ground && !tracks[k].is_body) || found.schedule.active(Index(k), frame))
         found.ground(Index(k), frame) = rest.height;
     }
     for (const internal::Rest& rest : rests[k].list)
