@@ -11,13 +11,16 @@ using Eigen::Index;
 
 namespace {
 
-// Points of a link, besides the first, that are worth having.
-constexpr std::size_t kMostOfLink = 6;
+// A point this close to one that was chosen is worth the less, the closer it is [m].
+constexpr double kApart = 0.15;
 
 struct Candidate {
   std::size_t body;
   Index point;
-  double score;  // how deep within reach it was, summed over frames
+  double score;           // how deep within reach it was, summed over frames
+  Eigen::Vector3d place;  // mean of where it was then, in the root's axes
+  double distance;        // to the closest one that was chosen
+  bool is_chosen;
 };
 
 }  // namespace
@@ -29,7 +32,11 @@ std::vector<BodyPoints> screenBodies(const pinocchio::Model& model,
   std::sort(levels.begin(), levels.end());
   pinocchio::Data data(model);
   std::vector<Eigen::VectorXd> scores, heights;
-  for (const BodyPoints& body : bodies) scores.push_back(Eigen::VectorXd::Zero(body.points.cols()));
+  std::vector<Eigen::Matrix3Xd> places;
+  for (const BodyPoints& body : bodies) {
+    scores.push_back(Eigen::VectorXd::Zero(body.points.cols()));
+    places.push_back(Eigen::Matrix3Xd::Zero(3, body.points.cols()));
+  }
   heights = scores;
   for (Index frame = 0; frame < motion.frames(); ++frame) {
     if (!missing[frame]) continue;
@@ -41,35 +48,41 @@ std::vector<BodyPoints> screenBodies(const pinocchio::Model& model,
                    joint.translation().z() - bodies[k].radius.array();
       if (heights[k].size() > 0) lowest = std::min(lowest, heights[k].minCoeff());
     }
-    for (std::size_t k = 0; k < bodies.size(); ++k)
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+      const pinocchio::SE3 relative = data.oMi[1].actInv(data.oMi[bodies[k].joint]);
       for (Index point = 0; point < heights[k].size(); ++point) {
         const double height = heights[k][point];
         double above = height - lowest;
         const auto level = std::upper_bound(levels.begin(), levels.end(), height);
         if (level != levels.begin()) above = std::min(above, height - *(level - 1));
-        scores[k][point] += std::max(0., reach - above);
+        const double score = std::max(0., reach - above);
+        scores[k][point] += score;
+        places[k].col(point) += score * relative.act(Eigen::Vector3d(bodies[k].points.col(point)));
       }
+    }
   }
 
   std::vector<Candidate> candidates;
   for (std::size_t k = 0; k < bodies.size(); ++k)
     for (Index point = 0; point < scores[k].size(); ++point)
-      if (scores[k][point] > 0.) candidates.push_back({k, point, scores[k][point]});
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+      if (scores[k][point] > 0.)
+        candidates.push_back({k, point, scores[k][point], places[k].col(point) / scores[k][point],
+                              std::numeric_limits<double>::infinity(), false});
+  // Low ones, and those that are apart: what carries is as wide as possible.
   std::vector<std::vector<Index>> chosen(bodies.size());
-  std::size_t count = 0;
-  for (std::size_t round = 0; round < kMostOfLink && count < most; ++round) {
-    // In each round the best of each link that is left.
-    std::vector<bool> taken(bodies.size(), false);
+  for (std::size_t count = 0; count < std::min(most, candidates.size()); ++count) {
+    Candidate* best = nullptr;
+    double best_value = -1.;
     for (Candidate& candidate : candidates) {
-      if (count >= most) break;
-      if (candidate.point < 0 || taken[candidate.body]) continue;
-      taken[candidate.body] = true;
-      chosen[candidate.body].push_back(candidate.point);
-      candidate.point = -1;
-      ++count;
+      const double value = candidate.score * std::min(1., candidate.distance / kApart);
+      if (candidate.is_chosen || value <= best_value) continue;
+      best = &candidate;
+      best_value = value;
     }
+    best->is_chosen = true;
+    chosen[best->body].push_back(best->point);
+    for (Candidate& candidate : candidates)
+      candidate.distance = std::min(candidate.distance, (candidate.place - best->place).norm());
   }
   std::vector<BodyPoints> screened;
   for (std::size_t k = 0; k < bodies.size(); ++k) {

@@ -47,12 +47,13 @@ def terrain_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
     if not heights:
         yield "The robot has no contacts."
     elif not known:
-        yield "No contact is ever active."
+        yield f"No contact {'of the robot file ' if found.analysis.bodies else ''}is ever active."
     elif slope := _slope_text(found):
         yield slope
     else:
         yield from _level_texts(robot, found, known)
-    yield from _held_texts(robot, found)
+    if not found.analysis.bodies:  # who lies or kneels has the feet where they are
+        yield from _held_texts(robot, found)
     yield from _disagreement_texts(found)
 
 

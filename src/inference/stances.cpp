@@ -209,8 +209,8 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
       if (rest.on_ground) levels.push_back(rest.height);
     }
   levels.push_back(lowest);
-  // Links are pressed into the ground, too.
-  if (lowest_contact - lowest <= settings.pressed_depth) levels.push_back(lowest_contact);
+  // Links are pressed into the ground, too, and geometry is not exact.
+  if (lowest_contact - lowest <= settings.body_ground) levels.push_back(lowest_contact);
   std::sort(levels.begin(), levels.end());
   const double same_contact = exact ? settings.exact_same_ground : settings.same_ground;
   for (std::size_t k = 0; k < points.size(); ++k) {
