@@ -28,6 +28,7 @@ void exposeDynaCoM();
 void exposeNumberTable();
 void exposeMotion();
 void exposeContactSchedule();
+void exposeCollisionPoints();
 void exposeContactInference();
 void exposeRecordedMotion();
 void exposeMotionAnalysis();

@@ -8,6 +8,8 @@ namespace {
 
 bp::list getParts(const PartRobot& split) { return toList(split.parts); }
 
+bp::list getBodies(const PartRobot& split) { return toList(split.bodies); }
+
 std::string writePart(const PartRobot::Part& part) {
   return internal::concat("PartRobot.Part(name='", part.name, "', contact=", part.contact,
                           ", limb=", part.limb, ")");
@@ -40,6 +42,10 @@ ContactInference infer(const PartRobot& parts, const bp::object& motions,
   const ContactSchedule* known =
       recorded.is_none() ? nullptr : bp::extract<const ContactSchedule*>(recorded)();
   return inferContacts(parts, own_motions, dynamics, exact, settings, known);
+}
+
+PartRobot split(const DynaCoM& robot, const bp::object& bodies) {
+  return splitContacts(robot, toVectorOf<BodyPoints>(bodies));
 }
 
 MotionAnalysis gather(const DynaCoM& robot, const PartRobot& parts, const bp::object& contacts,
@@ -79,6 +85,8 @@ void exposeContactInference() {
                               bp::no_init)
             .def_readonly("robot", &PartRobot::robot,
                           "A DynaCoM that knows each part as a ContactPoint")
+            .add_property("bodies", &getBodies,
+                          "Names of the links that may touch something besides the contacts")
             .add_property("parts", &getParts, "A PartRobot.Part for each of them")
             .def(PrintVisitor<PartRobot>(&writePartRobot))
             .def(CopyVisitor<PartRobot>());
@@ -86,7 +94,8 @@ void exposeContactInference() {
         .def_readonly("name", &PartRobot::Part::name,
                       "Of the contact; for one of several parts `<contact>.<part>`")
         .def_readonly("contact", &PartRobot::Part::contact,
-                      "Whose part it is: its place among the whole robot's contacts")
+                      "Whose part it is: its place among the whole robot's contacts, or, behind\n"
+                      "these, among the bodies")
         .def_readonly("limb", &PartRobot::Part::limb,
                       "Parts on one joint, or on a joint that moves another's, share a number")
         .def(PrintVisitor<PartRobot::Part>(&writePart))
@@ -120,10 +129,11 @@ void exposeContactInference() {
       .def(CopyVisitor<ContactInference>());
 
   bp::def(
-      "splitContacts", &splitContacts, bp::arg("robot"),
+      "splitContacts", &split, (bp::arg("robot"), bp::arg("bodies") = bp::list()),
       "The PartRobot of a DynaCoM: a Contact6D becomes a point for each of its corners, called\n"
       "front_left, front_right, rear_left and rear_right; a ContactPoint stays what it is.\n"
-      "Raises ValueError if a contact is of another kind, NotReadyError before initialize().");
+      "Links of BodyPoints follow, whose points are called body.<link>.<number>. Raises\n"
+      "ValueError if a contact is of another kind, NotReadyError before initialize().");
   bp::def("gatherParts", &gather,
           (bp::arg("robot"), bp::arg("parts"), bp::arg("contacts"), bp::arg("motions"),
            bp::arg("analysis")),

@@ -14,6 +14,17 @@ bp::list getContacts(const MotionAnalysis& analysis) { return toList(analysis.co
 
 bp::list getParts(const MotionAnalysis& analysis) { return toList(analysis.parts); }
 
+bp::list getBodies(const MotionAnalysis& analysis) { return toList(analysis.bodies); }
+
+std::string writeBody(const MotionAnalysis::Body& body) {
+  return internal::concat("MotionAnalysis.Body(link='", body.link, "', frames=", body.active.size(),
+                          ", active_frames=", body.active.count(), ")");
+}
+
+bp::object getBodyActive(const MotionAnalysis::Body& body) {
+  return bp::object(ContactSchedule::Matrix(body.active.matrix())).attr("reshape")(-1);
+}
+
 std::string writeAnalysis(const MotionAnalysis& analysis) {
   std::map<DistributionStatus, int> counts;
   for (const DistributionStatus status : analysis.status) ++counts[status];
@@ -108,8 +119,19 @@ void exposeMotionAnalysis() {
           .add_property("contacts", &getContacts, "A MotionAnalysis.Contact for each contact")
           .add_property("parts", &getParts,
                         "The same for the contacts' parts, where these were gathered")
+          .add_property("bodies", &getBodies,
+                        "A MotionAnalysis.Body for each link that touches something, besides")
           .def(PrintVisitor<Analysis>(&writeAnalysis))
           .def(CopyVisitor<Analysis>());
+  using Body = MotionAnalysis::Body;
+  bp::class_<Body>("Body", "What a link does that touches something.", bp::no_init)
+      .def_readonly("link", &Body::link, "Its name")
+      .add_property("active", &getBodyActive, "(T,) of bool")
+      .add_property("force", &Rows<&Body::force>::get, "In the world's axes, (T, 3) [N]")
+      .add_property("position", &Rows<&Body::position>::get,
+                    "Where it pushes, (T, 3) [m]; NaN without load")
+      .def(PrintVisitor<Body>(&writeBody))
+      .def(CopyVisitor<Body>());
   bp::class_<Contact>("Contact", "What one contact does.", bp::no_init)
       .def_readonly("name", &Contact::name, "The name under which the robot knows it.")
       .add_property("active", &getContactActive, "(T,) of bool")

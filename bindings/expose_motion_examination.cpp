@@ -18,6 +18,14 @@ bp::object getInferred(const Examination& examination) {
   return examination.inferred ? bp::object(*examination.inferred) : bp::object();
 }
 
+bp::list getSeats(const Examination& examination) { return toList(examination.seats); }
+
+std::string writeSeat(const Seat& seat) {
+  return internal::concat("Seat(link='", seat.link, "', first=", seat.first,
+                          ", behind=", seat.behind, ", height=", seat.height,
+                          ", weight_share=", seat.weight_share, ")");
+}
+
 bp::list getSensitivity(const Examination& examination) { return toList(examination.sensitivity); }
 
 std::string writeExamination(const Examination& examination) {
@@ -41,10 +49,16 @@ std::shared_ptr<MotionExaminer> makeExaminer(const DynaCoM& robot, double cutoff
                                              bool flat_horizontal_ground, double omega,
                                              const DetectionSettings& detection,
                                              const VerdictSettings& verdict, bool sensitivity,
-                                             const bp::object& progress, int threads, int lanes) {
+                                             const bp::object& progress, int threads, int lanes,
+                                             const bp::object& bodies) {
   const AnalysisSettings analysis = {flat_horizontal_ground, omega, nullptr, threads, lanes};
-  const ExaminationSettings settings = {cutoff,  analysis,    detection,
-                                        verdict, sensitivity, toProgress<double>(progress)};
+  const ExaminationSettings settings = {cutoff,
+                                        analysis,
+                                        detection,
+                                        verdict,
+                                        toVectorOf<BodyPoints>(bodies),
+                                        sensitivity,
+                                        toProgress<double>(progress)};
   return std::make_shared<MotionExaminer>(robot, settings);
 }
 
@@ -64,6 +78,20 @@ void exposeMotionExamination() {
       .def(PrintVisitor<CutoffSensitivity>(&writeSensitivity))
       .def(CopyVisitor<CutoffSensitivity>());
 
+  bp::class_<Seat>("Seat",
+                   "A link that is held still high above all ground that is known while contacts\n"
+                   "cannot give what the motion needs, and that could give the rest. Its force\n"
+                   "counts nowhere.",
+                   bp::no_init)
+      .def_readonly("link", &Seat::link, "Its name")
+      .def_readonly("first", &Seat::first, "Frame")
+      .def_readonly("behind", &Seat::behind, "The frame after the last")
+      .def_readonly("height", &Seat::height, "Of its lowest point [m]")
+      .def_readonly("weight_share", &Seat::weight_share,
+                    "Mean vertical force that it would have to give [m g]")
+      .def(PrintVisitor<Seat>(&writeSeat))
+      .def(CopyVisitor<Seat>());
+
   bp::class_<Examination>("MotionExamination",
                           "All that was found of a recorded motion, see MotionExaminer.",
                           bp::no_init)
@@ -79,6 +107,10 @@ void exposeMotionExamination() {
       .def_readonly("schedule", &Examination::schedule, "The ContactSchedule of the contacts")
       .add_property("inferred", &getInferred,
                     "What inference finds on its own, where contacts were recorded; else None")
+      .def_readonly("bodies", &Examination::bodies,
+                    "The ContactSchedule of the links that carry at some time, by name")
+      .add_property("seats", &getSeats,
+                    "A Seat for each time in which a link may rest on what nothing is known of")
       .def_readonly("analysis", &Examination::analysis, "The MotionAnalysis")
       .def_readonly("verdict", &Examination::verdict, "The MotionVerdict")
       .def_readonly("statistics", &Examination::statistics, "The MotionStatistics")
@@ -105,10 +137,11 @@ void exposeMotionExamination() {
                 bp::arg("detection") = defaults.detection, bp::arg("verdict") = defaults.verdict,
                 bp::arg("sensitivity") = defaults.sensitivity, bp::arg("progress") = bp::object(),
                 bp::arg("threads") = defaults.analysis.threads,
-                bp::arg("lanes") = defaults.analysis.lanes)),
+                bp::arg("lanes") = defaults.analysis.lanes, bp::arg("bodies") = bp::list())),
            "cutoff: of the filter where derivatives have to be computed, 0 for none [Hz];\n"
            "sensitivity: whether to judge motions with half and twice the cut-off, too; progress:\n"
-           "called now and then with what part of the frames is analysed; the others as in the\n"
+           "called now and then with what part of the frames is analysed; bodies: BodyPoints of\n"
+           "links that may touch the ground where contacts do not suffice; the others as in the\n"
            "functions named above. Raises ValueError if one is out of its range, NotReadyError\n"
            "before the robot's initialize().")
       .def("examine", &examine, (bp::arg("self"), bp::arg("recorded")),

@@ -40,6 +40,7 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeContactSchedule();
   exposeRecordedMotion();
   exposeMotionAnalysis();
+  exposeCollisionPoints();
   exposeContactInference();
   exposeMotionVerdict();
   exposeMotionStatistics();

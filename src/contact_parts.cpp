@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 #include <utility>
@@ -20,20 +21,24 @@ using internal::throwInvalid;
 
 namespace {
 
+// μ of bodies where nothing is known of any ground.
+constexpr double kBodyFriction = 0.7;
+
 std::string nameCorner(const Eigen::Vector2d& corner) {
   return std::string(corner.x() > 0. ? "front" : "rear") + (corner.y() > 0. ? "_left" : "_right");
 }
 
-// A frame of the model at a corner of a surface; its name.
-std::string addCornerFrame(pinocchio::Model& model, const pinocchio::Frame& surface,
-                           const std::string& part, const Eigen::Vector2d& corner) {
+// A new frame of the model, and its name.
+std::string addFrame(pinocchio::Model& model, pinocchio::JointIndex joint,
+                     const pinocchio::SE3& placement, const std::string& part) {
   std::string name = part;
   while (model.existFrame(name)) name += '_';
-  const pinocchio::SE3 offset(Eigen::Matrix3d::Identity(),
-                              Eigen::Vector3d(corner.x(), corner.y(), 0.));
-  model.addFrame(
-      pinocchio::Frame(name, surface.parentJoint, surface.placement * offset, pinocchio::OP_FRAME));
+  model.addFrame(pinocchio::Frame(name, joint, placement, pinocchio::OP_FRAME));
   return name;
+}
+
+pinocchio::SE3 makeOffset(const Eigen::Vector3d& offset) {
+  return pinocchio::SE3(Eigen::Matrix3d::Identity(), offset);
 }
 
 // Numbers for joints, the same for those of which one moves the other.
@@ -99,9 +104,37 @@ MotionAnalysis::Contact makeContact(const std::string& name, Eigen::Index frames
   return contact;
 }
 
+// A schedule for owners of parts, whose numbers begin with `first`.
+ContactSchedule gather(const PartRobot& parts, std::size_t first, std::vector<std::string> owners,
+                       const ContactSchedule& schedule) {
+  const Eigen::Index frames = schedule.active.cols();
+  schedule.validate(frames);
+  ContactSchedule gathered;
+  gathered.names = std::move(owners);
+  const auto count = static_cast<Eigen::Index>(gathered.names.size());
+  gathered.active.setConstant(count, frames, false);
+  if (schedule.confidence.size() > 0) gathered.confidence.setZero(count, frames);
+  for (std::size_t k = 0; k < parts.parts.size(); ++k) {
+    const auto owner = static_cast<Eigen::Index>(parts.parts[k].contact - first);
+    if (parts.parts[k].contact < first || owner >= count) continue;
+    const auto part = static_cast<Eigen::Index>(k);
+    gathered.active.row(owner) = gathered.active.row(owner) || schedule.active.row(part);
+    if (schedule.confidence.size() > 0)
+      gathered.confidence.row(owner) =
+          gathered.confidence.row(owner).cwiseMax(schedule.confidence.row(part));
+  }
+  return gathered;
+}
+
 }  // namespace
 
-PartRobot splitContacts(const DynaCoM& robot) {
+std::size_t PartRobot::countContacts() const {
+  std::size_t count = 0;
+  for (const Part& part : parts) count = std::max(count, part.contact + 1);
+  return count - std::min(count, bodies.size());
+}
+
+PartRobot splitContacts(const DynaCoM& robot, const std::vector<BodyPoints>& bodies) {
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by splitContacts before initialize()");
   const std::vector<std::string> names = robot.getKnownContacts();
@@ -124,7 +157,9 @@ PartRobot splitContacts(const DynaCoM& robot) {
         part.mu = surface->getSettings().mu;
         part.weights = std::sqrt(double(corners.cols())) * surface->getSettings().weights.head<3>();
         part.world_aligned = true;
-        part.frame_name = addCornerFrame(model, frame, name, corners.col(i));
+        const Eigen::Vector3d corner(corners(0, i), corners(1, i), 0.);
+        part.frame_name =
+            addFrame(model, frame.parentJoint, frame.placement * makeOffset(corner), name);
         parts.push_back({name, k, 0});
         settings.push_back(part);
         joints.push_back(frame.parentJoint);
@@ -138,7 +173,33 @@ PartRobot splitContacts(const DynaCoM& robot) {
   for (const pinocchio::JointIndex joint : joints) limbs.add(joint);
   for (std::size_t k = 0; k < parts.size(); ++k) parts[k].limb = limbs.find(joints[k]);
 
-  PartRobot split{DynaCoM(model), std::move(parts)};
+  double mu = settings.empty() ? kBodyFriction : std::numeric_limits<double>::infinity();
+  for (const ContactPointSettings& part : settings) mu = std::min(mu, part.mu);
+  ContactPointSettings point;
+  point.mu = mu;
+  if (!settings.empty()) point.weights = settings.front().weights;
+  point.world_aligned = true;
+  int limb = 0;
+  for (const PartRobot::Part& part : parts) limb = std::max(limb, part.limb + 1);
+  std::vector<std::string> links;
+  for (const BodyPoints& body : bodies) {
+    if (body.points.cols() == 0) continue;
+    if (body.joint == 0 || body.joint >= static_cast<std::size_t>(model.njoints))
+      throwInvalid("body '", body.link, "': joint must be one of the robot's, 1 to ",
+                   model.njoints - 1, ", got ", body.joint);
+    internal::requireSize("radius", body.radius.size(), body.points.cols(), "points");
+    for (Eigen::Index i = 0; i < body.points.cols(); ++i) {
+      const std::string name = "body." + body.link + "." + std::to_string(i);
+      point.radius = body.radius[i];
+      point.frame_name = addFrame(model, body.joint, makeOffset(body.points.col(i)), name);
+      parts.push_back({name, names.size() + links.size(), limb});
+      settings.push_back(point);
+    }
+    links.push_back(body.link);
+    ++limb;
+  }
+
+  PartRobot split{DynaCoM(model), std::move(parts), std::move(links)};
   split.robot.setGroundHeight(robot.getGroundHeight());
   split.robot.setMinimalVerticalForce(robot.getMinimalVerticalForce());
   split.robot.setWrenchWeights(robot.getWrenchWeights());
@@ -162,6 +223,13 @@ MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
 
   std::vector<MotionAnalysis::Contact> gathered;
   std::vector<Gatherer> gatherers;
+  std::vector<MotionAnalysis::Body> bodies(parts.bodies.size());
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    bodies[k].link = parts.bodies[k];
+    bodies[k].active.setConstant(frames, false);
+    bodies[k].force.setZero(3, frames);
+    bodies[k].position.setZero(3, frames);
+  }
   for (const std::string& name : names) {
     gathered.push_back(makeContact(name, frames));
     gatherers.emplace_back(robot, name);
@@ -176,11 +244,18 @@ MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
       const MotionAnalysis::Contact& part = analysis.contacts[k];
       if (!part.active[frame]) continue;
       const std::size_t owner = parts.parts[k].contact;
+      const Eigen::Vector3d force =  // in the world
+          findRotation(motions[k], frame) * part.wrench.col(frame).head<3>();
+      if (owner >= names.size()) {
+        MotionAnalysis::Body& body = bodies.at(owner - names.size());
+        body.active[frame] = true;
+        body.force.col(frame) += force;
+        body.position.col(frame) += force.z() * motions[k].position.col(frame);
+        continue;
+      }
       gathered[owner].active[frame] = true;
       gathered[owner].vertical_force[frame] += part.vertical_force[frame];
-      // In the world, about the contact's origin.
-      const Eigen::Vector3d force =
-          findRotation(motions[k], frame) * part.wrench.col(frame).head<3>();
+      // About the contact's origin.
       const Eigen::Vector3d lever =
           motions[k].position.col(frame) - contacts[owner].position.col(frame);
       wrenches[owner].head<3>() += force;
@@ -194,6 +269,14 @@ MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
       gatherers[k].write(frame, wrench, gathered[k]);
     }
   }
+  const double least = robot.getMinimalVerticalForce();
+  for (MotionAnalysis::Body& body : bodies)
+    for (Eigen::Index frame = 0; frame < frames; ++frame)
+      if (body.force(2, frame) > 0. && body.force(2, frame) >= least)
+        body.position.col(frame) /= body.force(2, frame);
+      else
+        body.position.col(frame).setConstant(kNaN);
+  analysis.bodies = std::move(bodies);
   analysis.parts = std::move(analysis.contacts);
   analysis.contacts = std::move(gathered);
   return analysis;
@@ -202,22 +285,12 @@ MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
 ContactSchedule gatherParts(const DynaCoM& robot, const PartRobot& parts,
                             const ContactSchedule& schedule) {
   internal::requireSize("schedule.names", schedule.names.size(), parts.parts.size(), "parts");
-  const Eigen::Index frames = schedule.active.cols();
-  schedule.validate(frames);
-  ContactSchedule gathered;
-  gathered.names = robot.getKnownContacts();
-  const auto count = static_cast<Eigen::Index>(gathered.names.size());
-  gathered.active.setConstant(count, frames, false);
-  if (schedule.confidence.size() > 0) gathered.confidence.setZero(count, frames);
-  for (std::size_t k = 0; k < parts.parts.size(); ++k) {
-    const auto owner = static_cast<Eigen::Index>(parts.parts[k].contact);
-    const auto part = static_cast<Eigen::Index>(k);
-    gathered.active.row(owner) = gathered.active.row(owner) || schedule.active.row(part);
-    if (schedule.confidence.size() > 0)
-      gathered.confidence.row(owner) =
-          gathered.confidence.row(owner).cwiseMax(schedule.confidence.row(part));
-  }
-  return gathered;
+  return gather(parts, 0, robot.getKnownContacts(), schedule);
+}
+
+ContactSchedule gatherBodies(const PartRobot& parts, const ContactSchedule& schedule) {
+  internal::requireSize("schedule.names", schedule.names.size(), parts.parts.size(), "parts");
+  return gather(parts, parts.countContacts(), parts.bodies, schedule);
 }
 
 }  // namespace dynacom

@@ -7,9 +7,11 @@
 #include <mutex>
 #include <utility>
 
+#include "body_screening.hpp"
 #include "check.hpp"
 #include "motion_steps.hpp"
 #include "nan.hpp"
+#include "seat_search.hpp"
 
 namespace dynacom {
 
@@ -38,6 +40,7 @@ Eigen::MatrixXd findGround(const std::vector<ContactMotion>& contacts,
   const Eigen::Index frames = part_ground.cols();
   Eigen::MatrixXd ground = Eigen::MatrixXd::Constant(count, frames, internal::kNaN);
   for (std::size_t k = 0; k < parts.size(); ++k) {
+    if (parts[k].contact >= contacts.size()) continue;
     const auto owner = static_cast<Eigen::Index>(parts[k].contact);
     for (Eigen::Index frame = 0; frame < frames; ++frame) {
       const double height =
@@ -96,6 +99,63 @@ void addSmeared(const ContactSchedule& schedule, const Eigen::VectorXd& time, do
   }
 }
 
+// How many points there may be at most, see inferContacts().
+constexpr std::size_t kMaximalParts = 32;
+
+// The frames in which contacts cannot give what is needed.
+Eigen::Array<bool, Eigen::Dynamic, 1> findMissing(const MotionVerdict& verdict,
+                                                  const VerdictSettings& settings) {
+  Eigen::Array<bool, Eigen::Dynamic, 1> missing =
+      Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(verdict.unsure.size(), false);
+  for (const MotionFault fault : {MotionFault::ResidualForce, MotionFault::ResidualTorque,
+                                  MotionFault::CoPOutside, MotionFault::FlightWithSupportNeeded})
+    missing = missing || verdict[fault].measured.array() > settings[fault].limit;
+  return missing;
+}
+
+// Where the ground is under what is at rest on it.
+std::vector<double> findLevels(const ContactInference& found) {
+  std::vector<double> levels;
+  for (const Stance& stance : found.stances)
+    if (stance.on_ground) levels.push_back(stance.height);
+  return levels;
+}
+
+// Takes away what no link does that never carries.
+void dropIdle(ContactSchedule& bodies, std::vector<MotionAnalysis::Body>& analyzed) {
+  ContactSchedule kept;
+  std::vector<MotionAnalysis::Body> kept_analyzed;
+  std::vector<Eigen::Index> rows;
+  for (std::size_t k = 0; k < analyzed.size(); ++k) {
+    if (!analyzed[k].active.any()) continue;
+    rows.push_back(static_cast<Eigen::Index>(k));
+    kept.names.push_back(bodies.names[k]);
+    kept_analyzed.push_back(std::move(analyzed[k]));
+  }
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  kept.active.resize(count, bodies.active.cols());
+  if (bodies.confidence.size() > 0) kept.confidence.resize(count, bodies.active.cols());
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Eigen::Index row = rows[static_cast<std::size_t>(k)];
+    kept.active.row(k) = bodies.active.row(row);
+    if (bodies.confidence.size() > 0) kept.confidence.row(k) = bodies.confidence.row(row);
+  }
+  bodies = std::move(kept);
+  analyzed = std::move(kept_analyzed);
+}
+
+// A motion with certain parts of a robot.
+struct Attempt {
+  const PartRobot* parts;
+  internal::Desks* desks;
+  std::vector<ContactMotion> motions;  // relative to the ground
+  ContactInference inference;
+  std::optional<ContactSchedule> inferred;
+  double ground_height;
+  MotionAnalysis analysis;
+  MotionVerdict verdict;
+};
+
 }  // namespace
 
 /// What is kept from one motion to the next.
@@ -123,87 +183,127 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   MotionExamination found = {};
   found.derived = deriveMotion(robot.getModel(), recorded, settings.cutoff);
   const Motion& motion = found.derived.motion;
-  found.parts = parts.parts;
   found.contacts = internal::computeContactMotions(desks, motion, workers);
-  found.part_motions = internal::computeContactMotions(part_desks, motion, workers);
 
   std::vector<double> cutoffs;
   if (settings.sensitivity && found.derived.cutoff > 0.)
     for (const double cutoff : {0.5 * found.derived.cutoff, 2. * found.derived.cutoff})
       if (cutoff < kMaximalCutoff * found.derived.frame_rate) cutoffs.push_back(cutoff);
   Eigen::Index done = 0;
-  const auto work = double(motion.frames()) * double(2 + cutoffs.size());
+  const auto work = double(motion.frames()) * double(2 + !settings.bodies.empty() + cutoffs.size());
   AnalysisSettings analysis_settings = settings.analysis;
   analysis_settings.progress = nullptr;
   if (progress)
     analysis_settings.progress = [&](Eigen::Index frames) {
       progress(double(done + frames) / work);
     };
-  const auto analyze = [&](const Motion& moved, const ContactSchedule& schedule,
-                           double ground_height) {
-    MotionAnalysis analysis = internal::analyzeMotion(part_desks, ground_height, moved, schedule,
+  const auto analyze = [&](internal::Desks& part_robots, const Motion& moved,
+                           const ContactSchedule& schedule, double ground_height) {
+    MotionAnalysis analysis = internal::analyzeMotion(part_robots, ground_height, moved, schedule,
                                                       analysis_settings, workers);
     done += motion.frames();
     return analysis;
   };
-
-  {
-    ContactSchedule none;
-    none.active.resize(0, motion.frames());
-    const MotionAnalysis dynamics = analyze(motion, none, robot.getGroundHeight());
-    const DerivedMotion& derived = found.derived;
-    const bool exact =
-        derived.cutoff == 0. || (derived.is_automatic && derived.thinned_noise <= kExactNoise);
-    const auto infer = [&](const ContactSchedule* schedule) {
-      return inferContacts(parts, found.part_motions, dynamics, exact, settings.detection,
-                           schedule);
-    };
-    if (recorded.schedule.has_value()) {
-      for (const std::string& name : recorded.schedule->names) robot.getContact(name);
-      found.inference = infer(&*recorded.schedule);
-      found.inferred = gatherParts(robot, parts, infer(nullptr).schedule);
-    } else {
-      found.inference = infer(nullptr);
-    }
-  }
-  const ContactSchedule& schedule = found.inference.schedule;
-  found.schedule = gatherParts(robot, parts, schedule);
-  if (recorded.schedule.has_value())
-    found.schedule.confidence = findRecordedConfidence(found.schedule.names, *recorded.schedule);
-  makeRelative(found.inference.ground_velocity, found.part_motions);
-  found.ground =
-      findGround(found.contacts, parts.parts, found.part_motions, found.inference.ground);
-  const double ground_height = findMeanGround(found.inference, robot.getGroundHeight());
-
-  const auto judge = [&](const DerivedMotion& derived, const std::vector<ContactMotion>& motions,
+  const auto judge = [&](const Attempt& attempt, const DerivedMotion& derived,
+                         const std::vector<ContactMotion>& motions,
                          const MotionAnalysis& analysis) {
     Eigen::Array<bool, Eigen::Dynamic, 1> unsure = derived.unsure;
-    addSmeared(schedule, derived.motion.time, derived.cutoff, unsure);
-    return internal::judgeMotion(parts.robot, derived.motion, recorded, motions,
-                                 found.inference.ground, analysis, unsure, settings.verdict,
+    addSmeared(attempt.inference.schedule, derived.motion.time, derived.cutoff, unsure);
+    return internal::judgeMotion(attempt.parts->robot, derived.motion, recorded, motions,
+                                 attempt.inference.ground, analysis, unsure, settings.verdict,
                                  workers);
   };
-  const MotionAnalysis analysis = analyze(motion, schedule, ground_height);
-  found.verdict = judge(found.derived, found.part_motions, analysis);
-  found.analysis = gatherParts(robot, parts, found.contacts, found.part_motions, analysis);
+
+  ContactSchedule none;
+  none.active.resize(0, motion.frames());
+  const MotionAnalysis dynamics = analyze(part_desks, motion, none, robot.getGroundHeight());
+  const bool exact = found.derived.cutoff == 0. ||
+                     (found.derived.is_automatic && found.derived.thinned_noise <= kExactNoise);
+  if (recorded.schedule.has_value())
+    for (const std::string& name : recorded.schedule->names) robot.getContact(name);
+  const auto attempt = [&](const PartRobot& used, internal::Desks& used_desks) {
+    Attempt made = {&used, &used_desks, {}, {}, {}, 0., {}, {}};
+    made.motions = internal::computeContactMotions(used_desks, motion, workers);
+    const auto infer = [&](const ContactSchedule* schedule) {
+      return inferContacts(used, made.motions, dynamics, exact, settings.detection, schedule);
+    };
+    made.inference = infer(recorded.schedule ? &*recorded.schedule : nullptr);
+    if (recorded.schedule) made.inferred = gatherParts(robot, used, infer(nullptr).schedule);
+    makeRelative(made.inference.ground_velocity, made.motions);
+    made.ground_height = findMeanGround(made.inference, robot.getGroundHeight());
+    made.analysis = analyze(used_desks, motion, made.inference.schedule, made.ground_height);
+    made.verdict = judge(made, found.derived, made.motions, made.analysis);
+    return made;
+  };
+
+  Attempt best = attempt(parts, part_desks);
+  // With links, where the contacts alone do not suffice, and some are low then.
+  std::optional<PartRobot> body_parts;
+  std::optional<internal::Desks> body_desks;
+  if (!settings.bodies.empty()) {
+    const Eigen::Array<bool, Eigen::Dynamic, 1> missing =
+        findMissing(best.verdict, settings.verdict);
+    std::vector<BodyPoints> bodies;
+    if (missing.any() && parts.parts.size() < kMaximalParts)
+      bodies = internal::screenBodies(robot.getModel(), settings.bodies, motion, missing,
+                                      findLevels(best.inference), settings.detection.body_reach,
+                                      kMaximalParts - parts.parts.size());
+    if (bodies.empty()) {
+      done += motion.frames();
+      if (progress) progress(double(done) / work);
+    } else {
+      body_parts.emplace(splitContacts(robot, bodies));
+      body_desks.emplace(body_parts->robot, settings.analysis.lanes);
+      Attempt other = attempt(*body_parts, *body_desks);
+      if (findMissing(other.verdict, settings.verdict).count() < missing.count())
+        best = std::move(other);
+    }
+  }
+
+  const PartRobot& used = *best.parts;
+  found.parts = used.parts;
+  found.part_motions = std::move(best.motions);
+  found.inferred = std::move(best.inferred);
+  const ContactSchedule& schedule = best.inference.schedule;
+  found.schedule = gatherParts(robot, used, schedule);
+  if (recorded.schedule.has_value())
+    found.schedule.confidence = findRecordedConfidence(found.schedule.names, *recorded.schedule);
+  found.bodies = gatherBodies(used, schedule);
+  found.ground = findGround(found.contacts, used.parts, found.part_motions, best.inference.ground);
+  if (!settings.bodies.empty()) {
+    const std::vector<double> levels = findLevels(best.inference);
+    const Eigen::Array<bool, Eigen::Dynamic, 1> missing =
+        findMissing(best.verdict, settings.verdict);
+    if (!levels.empty())
+      found.seats = internal::findSeats(settings.bodies, motion,
+                                        {used, found.part_motions, schedule, best.analysis, missing,
+                                         *std::max_element(levels.begin(), levels.end())},
+                                        settings);
+  }
+  found.verdict = std::move(best.verdict);
+  found.analysis =
+      gatherParts(robot, used, found.contacts, found.part_motions, std::move(best.analysis));
+  dropIdle(found.bodies, found.analysis.bodies);
   found.verdict.normals = internal::findNormals(found.contacts, found.analysis.contacts);
   found.statistics = summarizeMotion(robot, motion, found.analysis, found.verdict);
   for (const double cutoff : cutoffs) {
     const DerivedMotion other = rederiveMotion(robot.getModel(), recorded, cutoff);
-    const MotionAnalysis other_analysis = analyze(other.motion, schedule, ground_height);
+    const MotionAnalysis other_analysis =
+        analyze(*best.desks, other.motion, schedule, best.ground_height);
     std::vector<ContactMotion> motions =
-        internal::computeContactMotions(part_desks, other.motion, workers);
-    makeRelative(found.inference.ground_velocity, motions);
+        internal::computeContactMotions(*best.desks, other.motion, workers);
+    makeRelative(best.inference.ground_velocity, motions);
     CutoffSensitivity sensitivity = {};
     sensitivity.cutoff = cutoff;
-    sensitivity.verdict = judge(other, motions, other_analysis);
+    sensitivity.verdict = judge(best, other, motions, other_analysis);
     sensitivity.statistics = summarizeMotion(
         robot, other.motion,
-        gatherParts(robot, parts, internal::computeContactMotions(desks, other.motion, workers),
+        gatherParts(robot, used, internal::computeContactMotions(desks, other.motion, workers),
                     motions, other_analysis),
         sensitivity.verdict);
     found.sensitivity.push_back(std::move(sensitivity));
   }
+  found.inference = std::move(best.inference);
   return found;
 }
 

@@ -2,6 +2,7 @@
 #include "urdf.hpp"
 
 #include <console_bridge/console.h>
+#include <urdf_parser/urdf_parser.h>
 
 #include <filesystem>
 #include <fstream>
@@ -57,11 +58,6 @@ std::string readFile(const std::string& path) {
   return content.str();
 }
 
-bool isXml(const std::string& urdf) {
-  const std::size_t first = urdf.find_first_not_of(" \t\r\n");
-  return first != std::string::npos && urdf[first] == '<';
-}
-
 // Whether the root joint moves nothing but a link without mass, which holds the robot by a floating
 // joint of the file's own.
 bool hasFloatingBase(const pinocchio::Model& model) {
@@ -71,6 +67,19 @@ bool hasFloatingBase(const pinocchio::Model& model) {
 }
 
 }  // namespace
+
+bool isXml(const std::string& urdf) {
+  const std::size_t first = urdf.find_first_not_of(" \t\r\n");
+  return first != std::string::npos && urdf[first] == '<';
+}
+
+urdf::ModelInterfaceSharedPtr readUrdfTree(const std::string& urdf) {
+  const std::string xml = isXml(urdf) ? urdf : readFile(urdf);
+  const ParserErrors errors;
+  const auto tree = ::urdf::parseURDF(xml);
+  if (!tree) throwInvalid("urdf is not a robot's URDF: ", errors.text());
+  return tree;
+}
 
 pinocchio::Model readUrdf(const std::string& urdf) {
   if (urdf.empty()) throwInvalid("DynaCoMSettings.urdf must be a file or XML, got ''");

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #pragma once
 
+#include <urdf_model/types.h>
+
 #include <pinocchio/multibody.hpp>
 #include <string>
 
@@ -12,5 +14,12 @@ namespace dynacom::internal {
 /// @param urdf  path of a URDF file, or the XML itself
 /// @throws std::invalid_argument if it cannot be read
 pinocchio::Model readUrdf(const std::string& urdf);
+
+/// The links and joints of a URDF.
+/// @throws std::invalid_argument if it cannot be read
+urdf::ModelInterfaceSharedPtr readUrdfTree(const std::string& urdf);
+
+/// Whether this is XML itself, and not a file's path.
+bool isXml(const std::string& urdf);
 
 }  // namespace dynacom::internal

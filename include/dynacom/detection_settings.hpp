@@ -32,8 +32,8 @@ struct DYNACOM_EXPORT DetectionSettings {
   double horizontal_part = 0.4;
   /// How long a point is at rest at least [s].
   double rest_duration = 0.03;
-  /// Rests between which a point moves no faster than three times the above, and whose heights differ by
-  /// no more than this, are one [m].
+  /// Rests between which a point moves no faster than three times the above, and whose heights
+  /// differ by no more than this, are one [m].
   double same_rest = 0.01;
 
   // Which stances are on the ground.
@@ -43,6 +43,16 @@ struct DYNACOM_EXPORT DetectionSettings {
   /// And so is one that is within this of such a one, or of the lowest [m]; of exact motions within
   /// the second.
   double same_ground = 0.035, exact_same_ground = 0.01;
+
+  // Links that are no contacts, and so may rest anywhere: see screenBodies().
+
+  /// A link may have touched what was within this below it while contacts could not give what the
+  /// motion needs [m].
+  double body_reach = 0.1;
+  /// Only the ground of a contact, or the lowest rest of all, carries links: what is no higher than
+  /// this above the lowest such level, or within this of another [m]. Having been landed on makes
+  /// no ground for links, since hands come to rest in the air.
+  double body_ground = 0.05;
 
   // Scales.
 

@@ -55,6 +55,16 @@ struct MotionAnalysis {
     Eigen::VectorXd friction_usage, yaw_usage, cop_margin;
   };
 
+  /// What a link does that touches something besides the contacts.
+  struct Body {
+    std::string link;
+    Eigen::Array<bool, Eigen::Dynamic, 1> active;
+    Eigen::Matrix3Xd force;  ///< [N]; zero where not active
+    /// Where it pushes: the mean of its parts' positions, weighed by their vertical forces [m]; NaN
+    /// where there is no such force.
+    Eigen::Matrix3Xd position;
+  };
+
   double omega;  ///< The ω in use; NaN where there is none, and then vrp, nl and dcm are NaN.
   Eigen::VectorXd time;
   Eigen::Matrix3Xd com, vcom, acom;              ///< c, ċ, c̈
@@ -69,6 +79,7 @@ struct MotionAnalysis {
   std::vector<Contact> contacts;  ///< all, as getKnownContacts() of the robot
   /// Of gatherParts(): the same for the parts of these contacts.
   std::vector<Contact> parts;
+  std::vector<Body> bodies;  ///< of gatherParts(), as PartRobot::bodies
 };
 
 /// Computes dynamics and distribution for every frame of a motion, whose contacts are placed by the

@@ -23,6 +23,9 @@ struct DYNACOM_EXPORT ExaminationSettings {
   AnalysisSettings analysis = {};
   DetectionSettings detection = {};
   VerdictSettings verdict = {};
+  /// Links that may touch the ground besides the contacts, of findCollisionPoints(); they are
+  /// looked at where the contacts alone cannot give what the motion needs.
+  std::vector<BodyPoints> bodies = {};
   /// Whether to judge the motion with half and twice the cut-off, too, where a filter is needed and
   /// takes them.
   bool sensitivity = false;
@@ -41,16 +44,29 @@ struct CutoffSensitivity {
   MotionStatistics statistics;
 };
 
+/// A link that is held still high above all ground that is known while contacts cannot give what
+/// the motion needs, and that could give the rest: it may sit or lean on something. Its force
+/// counts nowhere.
+struct Seat {
+  std::string link;
+  Eigen::Index first, behind;  ///< frames
+  double height;               ///< of its lowest point [m]
+  double weight_share;         ///< mean vertical force that it would have to give [m g]
+};
+
 /// All that was found of a recorded motion, step by step.
 struct MotionExamination {
   DerivedMotion derived;
   std::vector<ContactMotion> contacts;  ///< computeContactMotions()
-  std::vector<PartRobot::Part> parts;   ///< splitContacts()
+  /// splitContacts(), with the links that were looked at, if one of them carries.
+  std::vector<PartRobot::Part> parts;
   /// The same as `contacts` for the parts, but that velocities are relative to the ground.
   std::vector<ContactMotion> part_motions;
   /// inferContacts(): of the parts, within the contacts that are recorded, if there are any.
   ContactInference inference;
   ContactSchedule schedule;  ///< of the contacts, gathered from that of their parts
+  ContactSchedule bodies;    ///< of the links that carry at some time, by name
+  std::vector<Seat> seats;   ///< where links may rest on what nothing is known of
   /// What inferContacts() finds on its own, gathered, where contacts are recorded.
   std::optional<ContactSchedule> inferred;
   Eigen::MatrixXd ground;   ///< height of the ground under each contact's lowest part, contacts ×
@@ -80,7 +96,9 @@ class DYNACOM_EXPORT MotionExaminer {
   const ExaminationSettings& getSettings() const;
 
   /// Finds a motion's derivatives, what its contacts do and where the ground is, and what that asks
-  /// of them. Contacts are taken apart: what bears load is which of their parts touch. The ground
+  /// of them. Contacts are taken apart: what bears load is which of their parts touch. Where they
+  /// alone cannot give what the motion needs, contacts are inferred once more, with those links
+  /// that were low then; if more can be given so, these count, and carry like contacts. The ground
   /// that the centre of pressure lies on is the mean of those that the parts stand on. Results do
   /// not depend on what was examined before; several threads may call this at once.
   /// @throws std::invalid_argument if the motion or its schedule is not valid, see deriveMotion()

@@ -6,6 +6,7 @@ A settings file is YAML; what it does not name stays at its default::
     cutoff: auto          # of the filter [Hz]: what suits the motion; 0 or null for none
     omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
     flat: true            # the ground is flat and horizontal: see the CoP
+    feet_only: false      # nothing but the contacts of the robot file may touch the ground
     detection:            # DetectionSettings, field by field
       ground_height: null # [m]; null if it is to be found
       ground_velocity: [-1.0, 0.0, 0.0] # a treadmill's [m/s]; null if it is to be found
@@ -47,6 +48,9 @@ class AnalysisOptions:
     omega: float = 0.0
     #: Whether the centre of pressure is that of flat horizontal ground.
     flat: bool = True
+    #: Whether nothing but the robot's contacts may touch the ground; else its links may, too, where
+    #: contacts do not suffice.
+    feet_only: bool = False
     detection: DetectionSettings = field(default_factory=DetectionSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
 

@@ -19,6 +19,7 @@ import numpy as np
 from dynacom.analysis_options import AnalysisOptions
 from dynacom.batch_files import local_copy, printable
 from dynacom.dynacom_pywrap import (
+    CollisionPoints,
     Contact6DSettings,
     ContactPointSettings,
     DistributionStatus,
@@ -129,8 +130,10 @@ class Job:
             for name, settings in robot.contacts.items()
         }
         parts = (robot.name, robot.model, contacts, robot.urdf, robot.default, robot.joint_layouts)
+        # Meshes are read once, and not by every process.
+        points = None if self.options.feet_only else robot.collision_points
         options = self.options.to_dict()
-        return _make_job, (parts, options, self.fps, self.quat, self.trust, self.frames)
+        return _make_job, (parts, points, options, self.fps, self.quat, self.trust, self.frames)
 
     def settings(self) -> dict[str, Any]:
         """All that results depend on, but for the files: it can be written as JSON."""
@@ -142,6 +145,7 @@ class Job:
             "default": robot.default.tolist(),
             "joint_layouts": robot.joint_layouts,
             "contacts": {name: _jsonable(s) for name, s in robot.contacts.items()},
+            "bodies": None if self.options.feet_only else _digest_bodies(robot),
             "options": self.options.to_dict(),
             "fps": self.fps,
             "quat": self.quat,
@@ -181,7 +185,9 @@ class Job:
         return pyarrow.schema(fields, metadata)
 
 
-def _make_job(parts: tuple, options: dict[str, Any], *others: Any) -> Job:
+def _make_job(
+    parts: tuple, points: CollisionPoints | None, options: dict[str, Any], *others: Any
+) -> Job:
     name, model, contacts, urdf, default, layouts = parts
     made = {}
     for contact, (is_6d, values) in contacts.items():
@@ -190,7 +196,10 @@ def _make_job(parts: tuple, options: dict[str, Any], *others: Any) -> Job:
             setattr(settings, key, value)
     own = AnalysisOptions()
     own.update(options, "options")
-    return Job(Robot(name, model, made, urdf, default, layouts), own, *others)
+    robot = Robot(name, model, made, urdf, default, layouts)
+    if points is not None:
+        vars(robot)["collision_points"] = points  # as functools.cached_property keeps it
+    return Job(robot, own, *others)
 
 
 def _fields(settings: Any) -> dict[str, Any]:
@@ -203,6 +212,15 @@ def _jsonable(settings: Any) -> dict[str, Any]:
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in _fields(settings).items()
     }
+
+
+def _digest_bodies(robot: Robot) -> str:
+    """Differs where what may touch the ground differs."""
+    digest = hashlib.sha256()
+    for body in robot.collision_points.bodies:
+        digest.update(f"{body.link}:{body.joint}:".encode())
+        digest.update(body.points.tobytes() + body.radius.tobytes())
+    return digest.hexdigest()
 
 
 class FramesError(DynacomError):

@@ -151,6 +151,13 @@ _Gravity = Annotated[
     float | None,
     typer.Option("--gravity", metavar="G", help="Downward [m/s²]; 9.81 by default, 0 for none."),
 ]
+_FeetOnly = Annotated[
+    bool,
+    typer.Option(
+        "--feet-only",
+        help="Nothing but the robot's contacts touches the ground: no knees, no hands.",
+    ),
+]
 _Flat = Annotated[
     bool | None,
     typer.Option("--flat/--uneven", help="Is the ground flat and horizontal? See the CoP."),
@@ -192,6 +199,7 @@ def analyze(
     ground_height: _Ground = None,
     ground_velocity: _GroundVelocity = None,
     gravity: _Gravity = None,
+    feet_only: _FeetOnly = False,
     flat: _Flat = None,
     omega: _Omega = None,
     settings: _SettingsFile = None,
@@ -224,7 +232,9 @@ def analyze(
         clip,
         _load_robot(robot, urdf, contact, payload, gravity),
         schedule,
-        _make_options(settings, set_, cutoff, ground_height, ground_velocity, flat, omega),
+        _make_options(
+            settings, set_, cutoff, ground_height, ground_velocity, feet_only, flat, omega
+        ),
         fps=fps,
         quat=quat,
         trust=trust,
@@ -257,6 +267,7 @@ def show(
     ground_height: _Ground = None,
     ground_velocity: _GroundVelocity = None,
     gravity: _Gravity = None,
+    feet_only: _FeetOnly = False,
     flat: _Flat = None,
     omega: _Omega = None,
     settings: _SettingsFile = None,
@@ -270,7 +281,9 @@ def show(
         clip,
         _load_robot(robot, urdf, contact, payload, gravity),
         schedule,
-        _make_options(settings, set_, cutoff, ground_height, ground_velocity, flat, omega),
+        _make_options(
+            settings, set_, cutoff, ground_height, ground_velocity, feet_only, flat, omega
+        ),
         fps=fps,
         quat=quat,
         trust=trust,
@@ -310,6 +323,7 @@ def batch(
     ground_height: _Ground = None,
     ground_velocity: _GroundVelocity = None,
     gravity: _Gravity = None,
+    feet_only: _FeetOnly = False,
     flat: _Flat = None,
     omega: _Omega = None,
     settings: _SettingsFile = None,
@@ -356,7 +370,7 @@ def batch(
                 _load_robot(robot, urdf, contact, payload, gravity),
                 out,
                 options=_make_options(
-                    settings, set_, cutoff, ground_height, ground_velocity, flat, omega
+                    settings, set_, cutoff, ground_height, ground_velocity, feet_only, flat, omega
                 ),
                 fps=fps,
                 quat=quat,
@@ -421,6 +435,7 @@ def _make_options(
     cutoff: str | None,
     ground_height: float | None,
     ground_velocity: str | None,
+    feet_only: bool,
     flat: bool | None,
     omega: float | None,
 ) -> "dynacom.AnalysisOptions":
@@ -430,6 +445,8 @@ def _make_options(
     options.update_from_texts(texts or [])
     values = {"cutoff": _parse_cutoff(cutoff), "flat": flat, "omega": omega}
     given = {name: value for name, value in values.items() if value is not None}
+    if feet_only:
+        given["feet_only"] = True
     ground = {}
     if ground_height is not None:
         ground["ground_height"] = ground_height

@@ -118,8 +118,12 @@ def to_xyzw(quaternion: np.ndarray, order: str) -> np.ndarray:
 
 
 def normalize(
-    path: Path, quaternion: np.ndarray, order: str | None = None, option: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
+    path: Path,
+    quaternion: np.ndarray,
+    order: str | None = None,
+    option: bool = False,
+    believed: bool = False,
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Normalises the root's quaternions.
 
     Args:
@@ -127,13 +131,15 @@ def normalize(
         order: in which the file's were taken, ``xyzw`` or ``wxyz``; None where the file names
             their components.
         option: whether ``--quat`` can change it.
+        believed: whether ``--quat`` says it: robots may lie.
 
     Returns:
-        Quaternions of norm 1, where the norm was 1 up to rounding as they are; and |norm - 1|.
+        Quaternions of norm 1, where the norm was 1 up to rounding as they are; |norm - 1|; and
+        notes.
 
     Raises:
-        DynacomError: a norm is far from 1, or the robot would stand if the order were the other,
-            and does not as it is.
+        DynacomError: a norm is far from 1; or the robot would stand if the order were the other,
+            and does not as it is, and nobody says so.
     """
     norm = np.linalg.norm(quaternion, axis=1)
     error = np.abs(norm - 1.0)
@@ -152,13 +158,17 @@ def normalize(
         if heights.min() < NOT_UPRIGHT:  # else their median is not either
             up, other_up = np.median(heights), np.median(_heights(to_xyzw(columns, other)))
             if up < NOT_UPRIGHT and other_up > UPRIGHT:
+                turn = (
+                    f"turn its z axis to a height of {up:.2f} in the median frame, and to "
+                    f"{other_up:.2f} in the other order"
+                )
+                if believed:
+                    return quaternion, error, [f"The root's quaternions, {_ORDERS[order]}, {turn}."]
                 raise DynacomError(
                     f"{path}: the root's quaternions must be {_ORDERS[order]}, got "
-                    f"{_ORDERS[other]}: they turn its z axis to a height of {up:.2f} in the median "
-                    f"frame, and to {other_up:.2f} in the other order"
-                    + (f"; give --quat {other}" if option else "")
+                    f"{_ORDERS[other]}: they {turn}" + (f"; give --quat {other}" if option else "")
                 )
-    return quaternion, error
+    return quaternion, error, []
 
 
 def _heights(quaternion: np.ndarray) -> np.ndarray:

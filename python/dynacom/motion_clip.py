@@ -85,6 +85,7 @@ def clip_from_configurations(
     names: Sequence[str],
     order: str | None,
     option: bool = False,
+    believed: bool = False,
     notes: Sequence[str] = (),
     v: np.ndarray | None = None,
     a: np.ndarray | None = None,
@@ -96,14 +97,15 @@ def clip_from_configurations(
     Args:
         names: of the joints that the file gives.
         order: of the file's quaternions; see :func:`normalize`.
-        option: whether ``--quat`` can change it.
+        option, believed: whether ``--quat`` can change it, and whether it says it.
 
     Raises:
         DynacomError: quaternions of another order or far from norm 1, angles in degrees.
     """
     notes = list(notes)
     q = q.copy()
-    q[:, 3:7], error = normalize(path, q[:, 3:7], order, option)
+    q[:, 3:7], error, doubts = normalize(path, q[:, 3:7], order, option, believed)
+    notes += doubts
     notes += check_angles(path, robot, names, joint_angles(robot, q, names))
     known, there = robot.joints.names, set(names)
     if held := [name for name in known if name not in there]:

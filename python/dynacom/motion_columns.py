@@ -82,6 +82,7 @@ def clip_from_columns(
         table.take(names),
         order=order,
         option=True,
+        believed=options.quat is not None,
         notes=notes,
         schedule=schedule,
         forces=forces,

@@ -261,7 +261,8 @@ def _read_tracking(path: Path, robot: Robot, arrays: _Arrays, options: Options) 
         position, quaternion = joint_pos[:, :3], to_xyzw(joint_pos[:, 3:7], order)
     else:
         position, quaternion = bodies.position[:, bodies.root], bodies.quaternion[:, bodies.root]
-    unit, _ = normalize(path, quaternion, order, option=True)
+    believed = options.quat is not None
+    unit, _, _ = normalize(path, quaternion, order, True, believed)
     root = np.hstack([position, unit])
 
     count = angles.shape[1]
@@ -290,6 +291,7 @@ def _read_tracking(path: Path, robot: Robot, arrays: _Arrays, options: Options) 
         angles,
         order=order,
         option=True,
+        believed=believed,
         notes=notes,
         v=_read_velocities(path, robot, arrays, names, columns, count, unit, bodies),
     )

@@ -100,6 +100,7 @@ def _read(path: Path, content: Mapping[str, Any], robot: Robot, options: Options
         joints,
         order=order,
         option=True,
+        believed=options.quat is not None,
         notes=notes,
     )
 

@@ -33,6 +33,7 @@ from dynacom.dynacom_pywrap import (
 )
 from dynacom.errors import DynacomError
 from dynacom.motion_file import Clip, read_motion
+from dynacom.other_contacts import body_statistics, body_texts
 from dynacom.results_folder import results_folder
 from dynacom.robots import Robot, load_robot
 from dynacom.schedule_file import read_schedule, write_schedule
@@ -94,6 +95,13 @@ _CONTACT_STATISTICS = (
     "largest_friction_usage",
     "largest_cone_usage",
     "least_cop_margin",
+)
+# Of a link that touches something besides the contacts.
+_BODY_COLUMNS = (
+    ("active", ("",), ""),
+    ("confidence", ("",), ""),
+    ("force", _XYZ, "N"),
+    ("position", _XYZ, "m"),
 )
 # Where the file says what the contacts felt.
 _MEASURED_COLUMNS = (("measured_force", _XYZ, "N"), ("measured_torque", _XYZ, "N m"))
@@ -180,6 +188,9 @@ class MotionReport:
             for part in self.examination.analysis.parts:
                 if part.name.startswith(f"{contact}."):
                     yield f"contact.{part.name}.active", ("",), ""
+        for body in self.examination.analysis.bodies:
+            for name, endings, units in _BODY_COLUMNS:
+                yield f"body.{body.link}.{name}", endings, units
 
     def to_dataframe(self) -> "pandas.DataFrame":
         """The table of frames, for pandas.
@@ -324,6 +335,7 @@ def make_examiner(
         options.detection,
         options.verdict,
         sensitivity,
+        bodies=[] if options.feet_only else robot.collision_points.bodies,
         **others,
     )
 
@@ -377,6 +389,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         derivatives,
         report._schedule_text,
         *terrain_texts(robot, found),
+        *body_texts(robot, report.options, found),
     ]
     solved = statistics.share(DistributionStatus.Solved)
     residual = statistics.mean_residual.tolist()
@@ -416,6 +429,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
             contact.name: {name: getattr(contact, name) for name in _CONTACT_STATISTICS}
             for contact in statistics.contacts
         },
+        "bodies": body_statistics(found),
         "mean_vertical_force": statistics.mean_vertical_force,
         "momentum_change": statistics.momentum_change,
         "unexplained": unexplained,
@@ -626,9 +640,15 @@ def _collect_arrays(
         if confidence is not None:
             values["confidence"] = confidence[:, index]
         arrays |= {f"contact.{contact.name}.{name}": array for name, array in values.items()}
-    for part in analysis.parts:
-        if "." in part.name:
+    for part, place in zip(analysis.parts, found.parts, strict=True):
+        if "." in part.name and place.contact < len(found.contacts):
             arrays[f"contact.{part.name}.active"] = np.asarray(part.active, dtype=bool)
+    for index, body in enumerate(analysis.bodies):
+        key = f"body.{body.link}"
+        arrays[f"{key}.active"] = np.asarray(body.active, dtype=bool)
+        arrays[f"{key}.confidence"] = found.bodies.confidence[:, index]
+        arrays[f"{key}.force"] = body.force
+        arrays[f"{key}.position"] = body.position
     return arrays
 
 

@@ -80,7 +80,7 @@ def write_page(
         contacts=_contacts(robot, arrays, summary),
         sensitivity=_sensitivity(summary),
         measured=_measured(summary),
-        key=_key(robot),
+        key=_key(robot, summary),
         dashed="; dashed: the file's" if any(c["measured"] for c in data["contacts"]) else "",
         scene_class="" if recording else "none",
         data=_json(data),
@@ -286,11 +286,11 @@ def _dot(color: tuple[int, int, int]) -> str:
     return f'<i style="background: {_css(color)}"></i>'
 
 
-def _key(robot: Robot) -> str:
+def _key(robot: Robot, summary: Mapping[str, Any]) -> str:
     """What the scene's colours mean."""
     points = {"com": "CoM", "cop": "CoP", "vrp": "VRP", "support": "support"}
     colors = {title: scene.COLORS[name] for name, title in points.items()}
-    for number, name in enumerate(robot.contacts):
+    for number, name in enumerate([*robot.contacts, *summary["bodies"]]):
         colors[f"force on {name}"] = scene.contact_color(number)
     return "".join(f"<span>{_dot(color)} {escape(text)}</span>" for text, color in colors.items())
 
@@ -308,6 +308,17 @@ def _contacts(robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[s
                 _number(contact["largest_vertical_force"], "m g"),
                 _number(np.max(friction, initial=-np.inf, where=np.isfinite(friction))),
                 _number(summary["ground"].get(name), "m"),
+            )
+        )
+    for number, (link, body) in enumerate(summary["bodies"].items(), len(robot.contacts)):
+        rows.append(
+            (
+                f"{_dot(scene.contact_color(number))} {escape(link)}",
+                _percent(body["active_share"]),
+                _percent(body["weight_share"]),
+                _number(body["largest_vertical_force"], "m g"),
+                _number(None),
+                _number(None),
             )
         )
     titles = (

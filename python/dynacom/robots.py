@@ -41,12 +41,14 @@ import numpy as np
 import pinocchio as pin
 
 from dynacom.dynacom_pywrap import (
+    CollisionPoints,
     Contact6D,
     Contact6DSettings,
     ContactPoint,
     ContactPointSettings,
     DynaCoM,
     DynaCoMSettings,
+    findCollisionPoints,
 )
 from dynacom.errors import DynacomError
 from dynacom.yaml_file import is_number, read_yaml
@@ -147,6 +149,14 @@ class Robot:
             np.array([joint.shortname().startswith("JointModelR") for joint in joints], dtype=bool),
             np.array([joint.nq == 2 for joint in joints], dtype=bool),
         )
+
+    @cached_property
+    def collision_points(self) -> CollisionPoints:
+        """Where its links may touch something besides the contacts: by the URDF's geometry.
+
+        Meshes are read, once.
+        """
+        return findCollisionPoints(self.dynacom(), str(self.urdf))
 
     def dynacom(self, inactive: Iterable[str] = ()) -> DynaCoM:
         """A new DynaCoM of this robot, which knows all its contacts.

@@ -32,7 +32,7 @@ _WORLD = "/world"
 
 
 def contact_color(number: int) -> tuple[int, int, int]:
-    """Red, green, blue of a robot's contact by its place in the robot's file."""
+    """Red, green, blue of a robot's contact by its place in the robot's file; then of links."""
     return CONTACT_COLORS[number % len(CONTACT_COLORS)]
 
 
@@ -209,7 +209,12 @@ class Scene:
         self._corners = [
             surface_corners(settings, arrays, name) for name, settings in robot.contacts.items()
         ]
-        self._active = np.array([arrays[f"contact.{name}.active"] for name in robot.contacts])
+        active = [arrays[f"contact.{name}.active"] for name in robot.contacts]
+        for link in summary["bodies"]:
+            position = arrays[f"body.{link}.position"]
+            self._corners.append(position[:, None])
+            active.append(np.isfinite(position[:, 0]))
+        self._active = np.array(active)
 
         self._world = self._scene.add_frame(_WORLD, show_axes=False)
         self._scene.add_grid(
@@ -224,7 +229,7 @@ class Scene:
         )
         self._aim_camera(server, robot.model, q[0])
         self._robot, self.note = _draw_robot(server, robot)
-        self._forces = list(self._draw_forces(robot))
+        self._forces = [*self._draw_forces(robot), *self._draw_body_forces(robot, summary)]
         self._draw_points()
         self.show(0)
 
@@ -270,9 +275,7 @@ class Scene:
             start = self._arrays[f"{key}.position"] + np.einsum(
                 "tij,tj->ti", rotation[:, :, :2], place
             )
-            # A slash would make levels in the scene's tree.
-            shown = "".join(c if c.isprintable() and c != "/" else "_" for c in name)
-            path = f"{_WORLD}/forces/{number} {shown}"
+            path = _force_path(number, name)
             force = np.einsum("tij,tj->ti", rotation, self._arrays[f"{key}.force"])
             yield self._arrow(path, color, 1.0, start, force)
             measured = self._arrays.get(f"{key}.measured_force")
@@ -280,6 +283,14 @@ class Scene:
                 force = np.einsum("tij,tj->ti", rotation, measured)
                 pale = tuple(int(127 + value / 2) for value in color)
                 yield self._arrow(f"{path}, measured", pale, 0.6, start, force)
+
+    def _draw_body_forces(
+        self, robot: Robot, summary: Mapping[str, Any]
+    ) -> Iterator[Callable[[int], None]]:
+        for number, link in enumerate(summary["bodies"], len(robot.contacts)):
+            start = np.nan_to_num(self._arrays[f"body.{link}.position"])
+            force = self._arrays[f"body.{link}.force"]
+            yield self._arrow(_force_path(number, link), contact_color(number), 1.0, start, force)
 
     def _arrow(
         self,
@@ -354,6 +365,12 @@ class Scene:
         hull = np.column_stack([hull, np.full(len(hull), height)]).round(3)
         self._support.vertices = hull
         self._border.points = np.stack([hull, np.roll(hull, -1, axis=0)], axis=1)
+
+
+def _force_path(number: int, name: str) -> str:
+    # A slash would make levels in the scene's tree.
+    shown = "".join(c if c.isprintable() and c != "/" else "_" for c in name)
+    return f"{_WORLD}/forces/{number} {shown}"
 
 
 def convex_hull(points: np.ndarray) -> np.ndarray:

@@ -49,12 +49,13 @@ def terrain_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
     if not heights:
         yield "The robot has no contacts."
     elif not known:
-        yield "No contact is ever active."
+        yield f"No contact {'of the robot file ' if found.analysis.bodies else ''}is ever active."
     elif slope := _slope_text(found):
         yield slope
     else:
         yield from _level_texts(robot, found, known)
-    yield from _held_texts(robot, found)
+    if not found.analysis.bodies:  # who lies or kneels has the feet where they are
+        yield from _held_texts(robot, found)
     yield from _disagreement_texts(found)
 
 
@@ -67,10 +68,17 @@ def _name(robot: Robot, found: MotionExamination, stance: Stance) -> str:
     return list(robot.contacts)[found.parts[stance.part].contact]
 
 
+def _stances(found: MotionExamination) -> Iterator[Stance]:
+    """Those of contacts: other links rest anywhere."""
+    for stance in found.inference.stances:
+        if found.parts[stance.part].contact < len(found.contacts):
+            yield stance
+
+
 def _used(found: MotionExamination) -> Iterator[Stance]:
     """The stances in which their part is active at some time."""
     active = np.asarray(found.inference.schedule.active)
-    for stance in found.inference.stances:
+    for stance in _stances(found):
         if stance.on_ground and active[stance.first : stance.behind, stance.part].any():
             yield stance
 
@@ -122,7 +130,7 @@ def _held_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
     time, active = found.analysis.time, np.asarray(found.schedule.active)
     lowest: dict[str, tuple[float, Stance]] = {}
     on_ground = [stance.height for stance in _used(found)]
-    for stance in found.inference.stances:
+    for stance in _stances(found):
         lasts = time[stance.behind - 1] - time[stance.first]
         name = _name(robot, found, stance)
         if stance.on_ground or lasts < _HELD:

@@ -58,6 +58,13 @@ bool ConeProjection::solve() {
   return true;
 }
 
+double ConeProjection::lift(std::uint32_t set) const {
+  double sum = 0.;
+  for (int k = 0; k < count_; ++k)
+    if (set >> edges_[k].point & 1u) sum += factors_[k] * columns_(2, k);
+  return sum;
+}
+
 void ConeProjection::drop(int position) {
   for (int k = position + 1; k < count_; ++k) {
     edges_[k - 1] = edges_[k];

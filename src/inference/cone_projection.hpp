@@ -36,6 +36,10 @@ class ConeProjection {
   Residual project(const Vector6& wrench, const Eigen::Matrix3Xd& levers,
                    const std::vector<double>& mu, std::uint32_t set);
 
+  /// The vertical force that some points gave together in the last answer. There may be other
+  /// answers that are as close.
+  double lift(std::uint32_t set) const;
+
  private:
   struct Edge {
     int point;

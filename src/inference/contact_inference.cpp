@@ -69,6 +69,7 @@ internal::KnownContacts findKnown(const PartRobot& parts, const ContactSchedule&
   std::vector<std::string> names;
   for (std::size_t k = 0; k < parts.parts.size(); ++k) {
     const std::size_t contact = parts.parts[k].contact;
+    if (contact >= parts.countContacts()) continue;  // nobody records what links do
     if (contact >= known.masks.size()) {
       known.masks.resize(contact + 1, 0);
       names.resize(contact + 1);
@@ -101,13 +102,14 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
   for (const auto* values : {&dynamics.com, &dynamics.ground_force, &dynamics.ground_torque})
     internal::requireSize("dynamics", values->cols(), frames, "frames");
 
+  const std::size_t contacts = parts.countContacts();
   std::vector<internal::PointTrack> tracks;
   tracks.reserve(count);
   const auto addTrack = [&](std::size_t k, const Eigen::Matrix3Xd& velocity) {
     const auto contact =
         std::dynamic_pointer_cast<const ContactPoint>(parts.robot.getContact(parts.parts[k].name));
     tracks.push_back({parts.parts[k].limb, contact ? contact->getSettings().mu : 0.,
-                      motions[k].position, velocity});
+                      parts.parts[k].contact >= contacts, motions[k].position, velocity});
   };
   for (std::size_t k = 0; k < count; ++k) {
     for (const auto* values : {&motions[k].position, &motions[k].velocity})
@@ -146,8 +148,9 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
     found.schedule.names.push_back(parts.parts[k].name);
     for (Index frame = 0; frame < frames; ++frame) {
       found.schedule.active(Index(k), frame) = path.sets[static_cast<std::size_t>(frame)] >> k & 1u;
-      found.ground(Index(k), frame) =
-          findGround(rests[k], frame, found.schedule.active(Index(k), frame));
+      const bool active = found.schedule.active(Index(k), frame);
+      if (active || !tracks[k].is_body)
+        found.ground(Index(k), frame) = findGround(rests[k], frame, active);
     }
     for (const internal::Rest& rest : rests[k].list)
       found.stances.push_back({k, rest.first, rest.behind, rest.height, rest.on_ground});

@@ -42,6 +42,8 @@ const std::vector<DetectionSettings::Constant>& DetectionSettings::constants() {
       {"landing_height", &DetectionSettings::landing_height},
       {"same_ground", &DetectionSettings::same_ground},
       {"exact_same_ground", &DetectionSettings::exact_same_ground},
+      {"body_reach", &DetectionSettings::body_reach},
+      {"body_ground", &DetectionSettings::body_ground},
       {"height_scale_least", &DetectionSettings::height_scale_least},
       {"height_scale_greatest", &DetectionSettings::height_scale_greatest},
       {"speed_scale_part", &DetectionSettings::speed_scale_part},

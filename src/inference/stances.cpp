@@ -129,6 +129,7 @@ Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
   std::map<std::pair<long, long>, std::vector<Eigen::Vector2d>> squares;
   Index all = 0;
   for (const PointTrack& point : points) {
+    if (point.is_body) continue;
     const Index frames = point.position.cols();
     all += frames;
     if (frames == 0) continue;
@@ -194,12 +195,14 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
       }
     return all;
   }
-  double lowest = std::numeric_limits<double>::infinity();
+  double lowest = std::numeric_limits<double>::infinity(), lowest_contact = lowest;
   std::vector<double> levels;
   for (std::size_t k = 0; k < points.size(); ++k)
     for (std::size_t i = 0; i < all[k].list.size(); ++i) {
       Rest& rest = all[k].list[i];
       lowest = std::min(lowest, rest.height);
+      if (points[k].is_body) continue;
+      lowest_contact = std::min(lowest_contact, rest.height);
       for (const int direction : {-1, 1})
         if (rise(points[k], all[k].list, i, direction, settings.same_rest) >=
             settings.landing_height)
@@ -207,13 +210,17 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
       if (rest.on_ground) levels.push_back(rest.height);
     }
   levels.push_back(lowest);
+  // Links are pressed into the ground, too, and geometry is not exact.
+  if (lowest_contact - lowest <= settings.body_ground) levels.push_back(lowest_contact);
   std::sort(levels.begin(), levels.end());
-  const double same = exact ? settings.exact_same_ground : settings.same_ground;
-  for (Rests& rests : all)
-    for (Rest& rest : rests.list) {
+  const double same_contact = exact ? settings.exact_same_ground : settings.same_ground;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const double same = points[k].is_body ? settings.body_ground : same_contact;
+    for (Rest& rest : all[k].list) {
       const auto level = std::lower_bound(levels.begin(), levels.end(), rest.height - same);
       if (level != levels.end() && *level <= rest.height + same) rest.on_ground = true;
     }
+  }
   return all;
 }
 
@@ -237,10 +244,18 @@ CostScales findScales(const std::vector<PointTrack>& points, const std::vector<R
     if (last - time[frame] <= kNearMovement) counts[frame] = true;
   }
 
+  // Links tell only where no contact does: they roll.
+  const auto tells = [&](std::size_t k, bool is_body) {
+    const auto& list = rests[k].list;
+    return points[k].is_body == is_body &&
+           std::any_of(list.begin(), list.end(), [](const Rest& rest) { return rest.on_ground; });
+  };
+  bool bodies = true;
+  for (std::size_t k = 0; k < points.size(); ++k) bodies = bodies && !tells(k, false);
   std::vector<double> scatter, speeds;
   for (std::size_t k = 0; k < points.size(); ++k)
     for (const Rest& rest : rests[k].list) {
-      if (!rest.on_ground) continue;
+      if (!rest.on_ground || points[k].is_body != bodies) continue;
       for (Index frame = rest.first; frame < rest.behind; ++frame) {
         if (!counts[frame]) continue;
         scatter.push_back(std::abs(points[k].position(2, frame) - rest.height));

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""What touches the ground besides a robot's contacts: knees, hands, a back."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dynacom.analysis_options import AnalysisOptions
+from dynacom.dynacom_pywrap import MotionExamination
+from dynacom.motion_joints import brief
+from dynacom.robots import Robot
+
+
+def body_statistics(found: MotionExamination) -> dict[str, dict[str, float]]:
+    """Link's name -> what part of the frames it is active in, and its vertical force [m g]."""
+    return {
+        body.link: {
+            "active_share": float(np.mean(body.active)),
+            "weight_share": float(np.mean(body.force[:, 2])) / found.statistics.weight,
+            "largest_vertical_force": float(np.max(body.force[:, 2])) / found.statistics.weight,
+        }
+        for body in found.analysis.bodies
+    }
+
+
+def body_texts(robot: Robot, options: AnalysisOptions, found: MotionExamination) -> Iterator[str]:
+    """Sentences on the links that carry, and on those that might and are not known."""
+    bodies = found.analysis.bodies
+    if bodies:
+        active = np.any([body.active for body in bodies], axis=0)
+        force = np.sum([body.force[:, 2] for body in bodies], axis=0)
+        *first, last = (body.link for body in bodies)
+        names = f"{', '.join(first)} and {last}" if first else last
+        share = force[active].mean() / found.statistics.weight
+        yield (
+            f"{names} {'carry' if first else 'carries'} {share:.0%} of the weight in "
+            f"{active.mean():.0%} of the frames; --feet-only leaves such contacts out."
+        )
+    time = found.analysis.time
+    for seat in found.seats:
+        yield (
+            f"{seat.link} would have to carry {seat.weight_share:.0%} of the weight at "
+            f"{seat.height:.2f} m from {time[seat.first]:.2f} to {time[seat.behind - 1]:.2f} s, "
+            "where no ground is known: a seat? Its force is not counted."
+        )
+    if options.feet_only or found.verdict.feasible:
+        return
+    if missing := robot.collision_points.missing:
+        yield (
+            f"{len(missing)} meshes of the robot's collision geometry cannot be read, and so what "
+            f"else may touch the ground is not known: {brief(missing)}."
+        )
