@@ -146,37 +146,69 @@
     return found;
   }
 
+  const SURE = 0.9; // a contact is drawn faint where its confidence is less
+
+  // Bars of one row: [[first, last frame], whether it is faint], ...
+  function bars(found, { row, width, color, name }) {
+    const half = count > 1 ? (last - first) / (count - 1) / 2 : 0.5;
+    return {
+      type: "bar",
+      orientation: "h",
+      base: found.map(([[start]]) => time[start] - half),
+      x: found.map(([[start, end]]) => time[end] - time[start] + 2 * half),
+      y: found.map(() => row),
+      width,
+      marker: { color, opacity: found.map(([, faint]) => (faint ? 0.4 : 1)) },
+      customdata: found.map(([[start, end], faint]) => [
+        time[start], time[end], escaped(name), faint ? ", unsure" : "",
+      ]),
+      hovertemplate:
+        "%{customdata[2]}: %{customdata[0]:.3f} to %{customdata[1]:.3f} s%{customdata[3]}" +
+        "<extra></extra>",
+    };
+  }
+
   function drawSchedule() {
     const status = column("status");
-    const rows = data.contacts.map(({ name, color }, index) => [
-      name, color, stretches((frame) => column(`${index}.active`)[frame] > 0),
-    ]);
+    const plain = (holds) => stretches(holds).map((stretch) => [stretch, false]);
+    const parts = [];
+    const rows = data.contacts.map(({ name, color, parts: own }, index) => {
+      const active = column(`${index}.active`);
+      const confidence = column(`${index}.confidence`);
+      const sure = (frame) => confidence[frame] >= SURE;
+      const found = [true, false].flatMap((wanted) =>
+        stretches((frame) => active[frame] > 0 && sure(frame) === wanted)
+          .map((stretch) => [stretch, !wanted]));
+      // Of what carries, a thin line for each part below the contact's bar.
+      own.forEach((part, number) => {
+        const touches = column(`${index}.part${number}`);
+        parts.push(bars(plain((frame) => touches[frame] > 0), {
+          row: index + 0.14 + (0.3 * (number + 0.5)) / own.length,
+          width: 0.2 / own.length,
+          color,
+          name: `${name}.${part}`,
+        }));
+      });
+      return { name, color, found, width: own.length ? 0.36 : 0.6, up: own.length ? 0.1 : 0 };
+    });
     const colors = new Map([["Solved", null], ["Relaxed", "#7a5195"], ["NoContact", "#b3261e"]]);
     data.statuses.forEach((name, code) => {
       const color = colors.has(name) ? colors.get(name) : "#5f6b76";
-      if (color !== null) rows.push([name, color, stretches((frame) => status[frame] === code)]);
+      const found = plain((frame) => status[frame] === code);
+      if (color !== null) rows.push({ name, color, found, width: 0.6, up: 0 });
     });
-    const half = count > 1 ? (last - first) / (count - 1) / 2 : 0.5;
-    const traces = rows.map(([name, color, found], row) => ({
-      type: "bar",
-      orientation: "h",
-      base: found.map(([start]) => time[start] - half),
-      x: found.map(([start, end]) => time[end] - time[start] + 2 * half),
-      y: found.map(() => row),
-      width: 0.6,
-      marker: { color },
-      customdata: found.map(([start, end]) => [time[start], time[end], escaped(name)]),
-      hovertemplate:
-        "%{customdata[2]}: %{customdata[0]:.3f} to %{customdata[1]:.3f} s<extra></extra>",
-    }));
+    const traces = [
+      ...parts,
+      ...rows.map(({ found, up, ...how }, row) => bars(found, { ...how, row: row - up })),
+    ];
     const yaxis = {
       ...AXIS,
       fixedrange: true,
       tickvals: rows.map((_, row) => row),
-      ticktext: rows.map(([name]) => shortened(name)),
+      ticktext: rows.map(({ name }) => shortened(name)),
       range: [rows.length - 0.5, -0.5],
     };
-    element("schedule").style.height = `${44 + 24 * rows.length}px`;
+    element("schedule").style.height = `${44 + 28 * rows.length}px`;
     const more = { showlegend: false, hovermode: "closest", barmode: "overlay", yaxis };
     return [traces, overTime([], more)];
   }

@@ -61,6 +61,7 @@ def write_page(
                 "name": name,
                 "color": _css(scene.contact_color(number)),
                 "measured": f"{number}.measured" in columns,
+                "parts": _parts(arrays, name),
                 "corners": sum(key.startswith(f"{number}.corner") for key in columns) // 2,
             }
             for number, name in enumerate(robot.contacts)
@@ -134,6 +135,13 @@ def _statuses(arrays: Mapping[str, np.ndarray]) -> list[str]:
     return sorted({str(status) for status in arrays["status"]})
 
 
+def _parts(arrays: Mapping[str, np.ndarray], contact: str) -> list[str]:
+    """What the parts of a contact are called, if it has any."""
+    begin, end = f"contact.{contact}.", ".active"
+    names = [key.removeprefix(begin) for key in arrays if key.startswith(begin)]
+    return [name.removesuffix(end) for name in names if name.endswith(end)]
+
+
 def _columns(
     robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
@@ -153,6 +161,9 @@ def _columns(
         key = f"contact.{name}"
         up = scene.rotation_matrices(arrays[f"{key}.rotation"])[:, 2]
         columns[f"{number}.active"] = arrays[f"{key}.active"]
+        columns[f"{number}.confidence"] = arrays[f"{key}.confidence"]
+        for part, place in enumerate(_parts(arrays, name)):
+            columns[f"{number}.part{part}"] = arrays[f"{key}.{place}.active"]
         columns[f"{number}.force"] = np.sum(up * arrays[f"{key}.force"], axis=1) / weight
         if f"{key}.measured_force" in arrays:
             columns[f"{number}.measured"] = (

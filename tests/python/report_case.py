@@ -82,6 +82,7 @@ def _contact_arrays(contact: Any, settings: Any, poses: list[pin.SE3]) -> Arrays
     half = [settings.half_length, settings.half_width] if is_sole else [0.0, 0.0]
     return {
         "active": np.asarray(contact.active, dtype=bool),
+        "confidence": np.asarray(contact.active, dtype=float),
         "force": force,
         "torque": torque,
         "cop": cop,

@@ -13,7 +13,6 @@ from dynacom.robots import Robot
 from helpers import CORNERS
 from puppet import FEET, Play, hops, make_puppet, stand, walk
 
-
 NEVER = np.inf
 
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import dynacom
 from dynacom import ContactSchedule, DistributionStatus, DynaCoM, Motion, NotReadyError
-from helpers import array_kinds, point, random_configuration, random_humanoid, sole
+from helpers import array_kinds, point, random_configuration, random_humanoid, share_by_edges, sole
 
 SOLVED, NO_CONTACT = DistributionStatus.Solved, DistributionStatus.NoContact
 FRAMES = 12
@@ -93,6 +93,51 @@ def assert_same(actual: dynacom.MotionAnalysis, expected: dynacom.MotionAnalysis
 
 
 # The analysis.
+
+
+def test_what_bears_load_less_readily(robot, model, motion, active):
+    """Weights are divided by √ρ, in lanes and without; forces are those of another solver."""
+    rng = np.random.default_rng(1)
+    readiness = rng.uniform(0.05, 1.0, active.shape)
+    schedule = ContactSchedule(NAMES, active, readiness=readiness)
+    robot.setGroundHeight(0.0)
+    analyses = [dynacom.analyzeMotion(robot, motion, schedule, lanes=lanes) for lanes in (1, 8)]
+    plain = dynacom.analyzeMotion(robot, motion, ContactSchedule(NAMES, active))
+    for one, other, without in zip(
+        analyses[0].contacts, analyses[1].contacts, plain.contacts, strict=True
+    ):
+        scale = np.abs(one.wrench).max(initial=1.0)
+        assert_allclose(one.wrench, other.wrench, rtol=0, atol=1e-10 * scale)
+        if one.name == "right":
+            assert np.abs(one.wrench - without.wrench).max() > 0.01 * scale
+    forces = {contact.name: contact.wrench for contact in analyses[0].contacts}
+
+    own = robot.copy()
+    compared = 0
+    for frame in range(FRAMES):
+        names = [name for name, on in zip(NAMES, active[frame], strict=True) if on]
+        if analyses[0].status[frame] != SOLVED or not names:
+            continue
+        own.computeDynamics(motion.q[frame], motion.v[frame], motion.a[frame])
+        contacts = []
+        for name in names:
+            contact = own.getContact(name)
+            settings = contact.getSettings()
+            ready = readiness[frame, NAMES.index(name)]
+            settings.weights = settings.weights / np.sqrt(ready)
+            contacts.append(type(contact)(settings))
+            contacts[-1].updateNewtonEuler(own.getCoM(), contact.getPose())
+        wrench = np.concatenate([own.getGroundCoMForce(), own.getGroundCoMTorque()])
+        expected = share_by_edges(contacts, wrench).forces
+        found = np.concatenate(
+            [
+                forces[name][frame, : contact.cols()]
+                for name, contact in zip(names, contacts, strict=True)
+            ]
+        )
+        assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+        compared += 1
+    assert compared >= 3
 
 
 @pytest.mark.parametrize("flat", [True, False])

@@ -131,6 +131,47 @@ def test_page_in_a_browser(hurried_page, hurried, request, root):
         assert difference(at_first, settled_picture(tab, "#scene")) < 1e-3
 
 
+def test_contacts_show_their_parts_and_how_sure_they_are(talos, hurried, tmp_path):
+    """A bar for each contact, faint where it is unsure, and a thin one below for each part."""
+    q, arrays, summary = hurried
+    names = list(talos.contacts)
+    left, right = (arrays[f"contact.{name}.active"] for name in names)
+    more = {}
+    sure = left.astype(float)
+    (first, *_), (*_, last) = np.flatnonzero(left), np.flatnonzero(left)
+    sure[last - 9 : last + 1] = 0.6
+    more[f"contact.{names[0]}.confidence"] = sure
+    heel, toe = left.copy(), left.copy()
+    heel[first + 5 :] = False
+    toe[: first + 5] = False
+    more |= {
+        f"contact.{names[0]}.heel.active": heel,
+        f"contact.{names[0]}.toe.active": toe,
+        f"contact.{names[1]}.toe.active": right,
+    }
+    path = tmp_path / "report.html"
+    write_page(path, talos, q, arrays | more, summary)
+    with open_page(path) as tab:
+        bars = tab.evaluate(
+            "document.getElementById('schedule').data.map(({base, x, y, marker, customdata}) =>"
+            " ({base, x, y, opacity: marker.opacity, names: customdata.map((c) => c[2])}))"
+        )
+    found = {bar["names"][0]: bar for bar in bars if bar["names"]}
+    time = arrays["time"]
+    for name, values in (("heel", heel), ("toe", toe)):
+        (own,) = [bar for key, bar in found.items() if key == f"{names[0]}.{name}"]
+        shown = np.zeros(len(time), dtype=bool)
+        for begin, length in zip(own["base"], own["x"], strict=True):
+            shown |= (time > begin) & (time < begin + length)
+        assert_array_equal(shown, values)
+        assert 0.0 < own["y"][0] < 0.5
+    faint = [value < 1.0 for value in found[names[0]]["opacity"]]
+    assert sum(faint) == 1
+    begin, length = (found[names[0]][key][faint.index(True)] for key in ("base", "x"))
+    assert_array_equal((time > begin) & (time < begin + length), left & (sure < 1.0))
+    assert set(found[names[1]]["opacity"]) == {1}
+
+
 def test_linked_plots(talos, hurried, tmp_path, monkeypatch):
     """What the page does without a scene."""
     monkeypatch.setitem(sys.modules, "viser", None)
