@@ -7,15 +7,15 @@ namespace dynacom::python {
 namespace {
 
 std::shared_ptr<BodyPoints> makeBody(const std::string& link, pinocchio::JointIndex joint,
-                                     const bp::object& points, const Eigen::VectorXd& radius) {
+                                     const bp::object& points, const bp::object& radius) {
   const auto body = std::make_shared<BodyPoints>();
   body->link = link;
   body->joint = joint;
   body->points.resize(3, bp::len(points));
   for (Eigen::Index k = 0; k < body->points.cols(); ++k)
     body->points.col(k) = toVector<3>("points", bp::object(points[k]));
-  internal::requireSize("radius", radius.size(), body->points.cols(), "points");
-  body->radius = radius;
+  body->radius = toNumbers("radius", radius, static_cast<int>(body->points.cols()));
+  internal::requireSize("radius", body->radius.size(), body->points.cols(), "points");
   return body;
 }
 

@@ -99,6 +99,10 @@ void addSmeared(const ContactSchedule& schedule, const Eigen::VectorXd& time, do
   }
 }
 
+// Links count if they leave so much less of the frames in which something is missing. A few frames
+// less may be chance.
+constexpr double kLeastGain = 0.1;
+
 // How many points there may be at most, see inferContacts().
 constexpr std::size_t kMaximalParts = 32;
 
@@ -255,7 +259,9 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
       body_parts.emplace(splitContacts(robot, bodies));
       body_desks.emplace(body_parts->robot, settings.analysis.lanes);
       Attempt other = attempt(*body_parts, *body_desks);
-      if (findMissing(other.verdict, settings.verdict).count() < missing.count())
+      const Eigen::Index given =
+          missing.count() - findMissing(other.verdict, settings.verdict).count();
+      if (given > 0 && double(given) >= kLeastGain * double(missing.count()))
         best = std::move(other);
     }
   }

@@ -22,11 +22,11 @@ constexpr double kSuffices = 0.8;
 // A link is held still if no point of it that matters is farther than this from its mean [m].
 constexpr double kStill = 0.03;
 // How far above all ground a seat is [m].
-constexpr double kAboveGround = 0.1;
+constexpr double kAboveGround = 0.2;
 // What of a link may touch a seat is no higher than this above its lowest point [m].
 constexpr double kThickness = 0.05;
 // Less than this is no reason to ask for a seat [m g].
-constexpr double kLeastShare = 0.1;
+constexpr double kLeastShare = 0.3;
 constexpr std::size_t kMaximalPoints = 32;
 
 struct Run {

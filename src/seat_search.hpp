@@ -19,7 +19,7 @@ struct SeatQuestion {
 };
 
 /// Times of half a second and more in which what is missing could be given by one link that is
-/// held still, and 0.1 m and more above all ground: of several that could, the lowest.
+/// held still, and 0.2 m and more above all ground: of several that could, the lowest.
 std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion& motion,
                             const SeatQuestion& question, const ExaminationSettings& settings);
 

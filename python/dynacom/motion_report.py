@@ -335,7 +335,8 @@ def make_examiner(
         options.detection,
         options.verdict,
         sensitivity,
-        bodies=[] if options.feet_only else robot.collision_points.bodies,
+        # A robot without contacts is not to stand on links of which nobody has said anything.
+        bodies=[] if options.feet_only or not robot.contacts else robot.collision_points.bodies,
         **others,
     )
 

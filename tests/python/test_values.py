@@ -86,6 +86,8 @@ def objects(talos, talos_standing, talos_motion):
         examination.statistics.contacts[0],
         examination.sensitivity[0],
         dynacom.compareMeasured(motion.v, motion.v),
+        dynacom.BodyPoints("trunk", 1, [[0.0, 0.1, 0.2]], [0.05]),
+        dynacom.CollisionPoints([], ["trunk.stl"]),
     ]
     return {type(value).__qualname__: value for value in objects} | {
         "DistributionResult.Contact": result.contacts[0],
