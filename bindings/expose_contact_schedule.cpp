@@ -26,7 +26,7 @@ std::shared_ptr<Schedule> makeSchedule(const bp::object& names, const Schedule::
 bp::list getNames(const Schedule& schedule) { return toList(schedule.names); }
 
 bp::object toRows(const Eigen::MatrixXd& matrix) {
-  return matrix.size() > 0 ? bp::object(Eigen::MatrixXd(matrix.transpose())) : bp::object();
+  return matrix.size() > 0 ? toArray(Eigen::MatrixXd(matrix.transpose())) : bp::object();
 }
 
 bp::object getConfidence(const Schedule& schedule) { return toRows(schedule.confidence); }

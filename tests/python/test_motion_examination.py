@@ -53,7 +53,7 @@ def test_settings_reach_what_they_are_for(talos, recorded):
     found = examiner.examine(recorded)
     assert found.derived.cutoff == 5.0
     assert found.analysis.omega == 2.5
-    assert_array_equal(found.ground, [0.5, 0.5])
+    assert_array_equal(found.ground, np.full((len(recorded.time), 2), 0.5))
     assert found.verdict.findings["residual_torque"].frames > 0
     assert [entry.cutoff for entry in found.sensitivity] == [2.5, 10.0]
 
