@@ -50,7 +50,7 @@ Eigen::MatrixXd findGround(const std::vector<ContactMotion>& contacts,
   return ground;
 }
 
-// The mean height of what is stood on; the robot's ground where nothing is.
+// The mean height of what is stood on; another where nothing is.
 double findMeanGround(const ContactInference& found, double otherwise) {
   double sum = 0.;
   Eigen::Index count = 0;
@@ -173,7 +173,9 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   makeRelative(found.inference.ground_velocity, found.part_motions);
   found.ground =
       findGround(found.contacts, parts.parts, found.part_motions, found.inference.ground);
-  const double ground_height = findMeanGround(found.inference, robot.getGroundHeight());
+  const double given = settings.detection.ground_height;
+  const double ground_height =
+      findMeanGround(found.inference, std::isnan(given) ? robot.getGroundHeight() : given);
 
   const auto judge = [&](const DerivedMotion& derived, const std::vector<ContactMotion>& motions,
                          const MotionAnalysis& analysis) {

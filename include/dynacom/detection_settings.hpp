@@ -32,8 +32,8 @@ struct DYNACOM_EXPORT DetectionSettings {
   double horizontal_part = 0.4;
   /// How long a point is at rest at least [s].
   double rest_duration = 0.03;
-  /// Rests between which a point moves no faster than three times the above, and whose heights differ by
-  /// no more than this, are one [m].
+  /// Rests between which a point moves no faster than three times the above, and whose heights
+  /// differ by no more than this, are one [m].
   double same_rest = 0.01;
 
   // Which stances are on the ground.
@@ -77,7 +77,8 @@ struct DYNACOM_EXPORT DetectionSettings {
   /// What the beginning or end of a contact costs.
   double change = 4.5;
 
-  /// The ground's height under all contacts [m]; NaN if it is to be found.
+  /// The ground's height under all contacts [m]; NaN if it is to be found. What rests higher above
+  /// it than `same_ground` is in the air.
   double ground_height = std::numeric_limits<double>::quiet_NaN();
   /// Velocity of the ground, a treadmill's, in the world, level [m/s]; NaN if it is to be found.
   Eigen::Vector3d ground_velocity =

@@ -253,7 +253,7 @@ def test_the_summary(talos, report):
     assert summary["duration"] == pytest.approx(6.34)
     assert summary["frame_rate"] == pytest.approx(50.0)
     assert summary["omega"] == pytest.approx(
-        np.sqrt(G / (report["com"][:, 2].mean() - np.mean([*summary["ground"].values()])))
+        np.sqrt(G / (report["com"][:, 2].mean() - np.mean([*summary["ground"].values()]))), rel=1e-4
     )
     assert summary["verdict"] == "feasible"
     assert summary["codes"] == ["feasible"]
@@ -673,7 +673,7 @@ def test_the_ground_given(talos, walk):
     options.detection.ground_height = -0.1
     report = analyze(replace(walk, schedule=None), talos, options=options)
     assert report.summary["ground"] == {"left_sole": None, "right_sole": None}
-    assert_array_equal(report.examination.ground, np.full((318, 2), -0.1))
+    assert_allclose(report.examination.ground, -0.1, rtol=0, atol=1e-12)
     assert report.summary["statuses"] == {"NoContact": 318}
     assert report.summary["codes"] == ["flight_with_support_needed"]
     assert_allclose(report["contact.left_sole.height"].min(), 0.1, atol=2e-3)
