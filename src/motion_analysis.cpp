@@ -139,7 +139,8 @@ class Analyst {
   // For what the lanes leave, as soon as there is any: a robot, and its contacts.
   std::shared_ptr<DynaCoM> worker_;
   std::vector<std::shared_ptr<ContactBase>> contacts_;
-  std::vector<Eigen::VectorXd> weights_;  // of the contacts' forces, where these may change
+  std::vector<Eigen::VectorXd> weights_;  // of the contacts' forces, as the robot has them
+  std::vector<double> factors_;           // by which the worker's are multiplied
   bool is_cold_ = true;                   // whether the worker has done nothing in this block
 };
 
@@ -164,8 +165,10 @@ DynaCoM& Analyst::prepare(Eigen::Index frame) {
     worker_->setGroundHeight(ground_height_);
     for (const MotionAnalysis::Contact& contact : result_.contacts) {
       contacts_.push_back(worker_->getContact(contact.name));
-      weights_.push_back(contacts_.back()->reg_A());
+      weights_.push_back(desks_.robot().getContact(contact.name)->reg_A());
     }
+    // Whoever had it before may have left it with other weights.
+    factors_.assign(contacts_.size(), kNaN);
   }
   if (is_cold_) {
     Desks::clear(*worker_);
@@ -177,7 +180,7 @@ DynaCoM& Analyst::prepare(Eigen::Index frame) {
     else
       worker_->deactivateContact(schedule_.names[k]);
   }
-  if (readiness_.size() > 0) setWeights(frame);
+  setWeights(frame);
   return *worker_;
 }
 
@@ -185,8 +188,11 @@ DynaCoM& Analyst::prepare(Eigen::Index frame) {
 void Analyst::setWeights(Eigen::Index frame) {
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
     if (!result_.contacts[k].active[frame]) continue;
-    const double factor = 1. / std::sqrt(readiness_(frame, static_cast<Eigen::Index>(k)));
-    if (contacts_[k]->reg_A()[0] == factor * weights_[k][0]) continue;
+    const double factor = readiness_.size() > 0
+                              ? 1. / std::sqrt(readiness_(frame, static_cast<Eigen::Index>(k)))
+                              : 1.;
+    if (factors_[k] == factor) continue;
+    factors_[k] = factor;
     const Eigen::Vector3d force_weights = factor * weights_[k].head<3>();
     if (auto* point = dynamic_cast<ContactPoint*>(contacts_[k].get())) {
       point->setForceWeights(force_weights);

@@ -53,7 +53,7 @@ Eigen::MatrixXd findGround(const std::vector<ContactMotion>& contacts,
   return ground;
 }
 
-// The mean height of what is stood on; the robot's ground where nothing is.
+// The mean height of what is stood on; another where nothing is.
 double findMeanGround(const ContactInference& found, double otherwise) {
   double sum = 0.;
   Eigen::Index count = 0;
@@ -102,6 +102,9 @@ void addSmeared(const ContactSchedule& schedule, const Eigen::VectorXd& time, do
 // Links count if they leave so much less of the frames in which something is missing. A few frames
 // less may be chance.
 constexpr double kLeastGain = 0.1;
+// And they are looked for if something is missing in more of the frames than this: the verdict
+// bears as many.
+constexpr double kMuch = 0.02;
 
 // How many points there may be at most, see inferContacts().
 constexpr std::size_t kMaximalParts = 32;
@@ -115,6 +118,10 @@ Eigen::Array<bool, Eigen::Dynamic, 1> findMissing(const MotionVerdict& verdict,
                                   MotionFault::CoPOutside, MotionFault::FlightWithSupportNeeded})
     missing = missing || verdict[fault].measured.array() > settings[fault].limit;
   return missing;
+}
+
+bool isMuch(const Eigen::Array<bool, Eigen::Dynamic, 1>& missing) {
+  return double(missing.count()) > kMuch * double(missing.size());
 }
 
 // Where the ground is under what is at rest on it.
@@ -234,7 +241,9 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
     made.inference = infer(recorded.schedule ? &*recorded.schedule : nullptr);
     if (recorded.schedule) made.inferred = gatherParts(robot, used, infer(nullptr).schedule);
     makeRelative(made.inference.ground_velocity, made.motions);
-    made.ground_height = findMeanGround(made.inference, robot.getGroundHeight());
+    const double given = settings.detection.ground_height;
+    made.ground_height =
+        findMeanGround(made.inference, std::isnan(given) ? robot.getGroundHeight() : given);
     made.analysis = analyze(used_desks, motion, made.inference.schedule, made.ground_height);
     made.verdict = judge(made, found.derived, made.motions, made.analysis);
     return made;
@@ -248,7 +257,7 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
     const Eigen::Array<bool, Eigen::Dynamic, 1> missing =
         findMissing(best.verdict, settings.verdict);
     std::vector<BodyPoints> bodies;
-    if (missing.any() && parts.parts.size() < kMaximalParts)
+    if (isMuch(missing) && parts.parts.size() < kMaximalParts)
       bodies = internal::screenBodies(robot.getModel(), settings.bodies, motion, missing,
                                       findLevels(best.inference), settings.detection.body_reach,
                                       kMaximalParts - parts.parts.size());
@@ -280,7 +289,7 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
     const std::vector<double> levels = findLevels(best.inference);
     const Eigen::Array<bool, Eigen::Dynamic, 1> missing =
         findMissing(best.verdict, settings.verdict);
-    if (!levels.empty())
+    if (!levels.empty() && isMuch(missing))
       found.seats = internal::findSeats(settings.bodies, motion,
                                         {used, found.part_motions, schedule, best.analysis, missing,
                                          *std::max_element(levels.begin(), levels.end())},

@@ -130,8 +130,8 @@ BOOST_AUTO_TEST_CASE(parts_of_one_limb_share_a_number) {
 
 BOOST_AUTO_TEST_CASE(a_frame_may_have_the_name_of_a_corner_already) {
   pinocchio::Model model = singleBody(10., {SE3::Identity()});
-  model.addFrame(pinocchio::Frame("foot.front_left", 1, SE3(Matrix3d::Identity(), {9., 9., 9.}),
-                                  pinocchio::OP_FRAME));
+  model.addFrame(pinocchio::Frame(
+      "foot.front_left", 1, SE3(Matrix3d::Identity(), Vector3d(9., 9., 9.)), pinocchio::OP_FRAME));
   DynaCoM robot(model);
   robot.addContact(makeSole("sole0"), "foot");
   Motion motion{VectorXd::Zero(1), restState(model).q, VectorXd::Zero(6), VectorXd::Zero(6)};

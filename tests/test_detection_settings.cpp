@@ -30,8 +30,10 @@ BOOST_AUTO_TEST_CASE(the_list_of_constants_has_each_field_once) {
   // Each kept its own number, so that no two are one; and there are no doubles but these, the
   // height and the velocity of the ground.
   number = 0.;
-  for (const auto& [name, field] : DetectionSettings::constants())
-    BOOST_TEST(settings.*field == ++number);
+  for (const DetectionSettings::Constant& constant : DetectionSettings::constants()) {
+    const double value = settings.*constant.second;
+    BOOST_TEST(value == ++number);
+  }
   BOOST_TEST(sizeof(DetectionSettings) == (names.size() + 4) * sizeof(double));
 }
 

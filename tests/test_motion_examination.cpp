@@ -85,13 +85,13 @@ BOOST_AUTO_TEST_CASE(an_examination_is_its_steps) {
   for (const bool scheduled : {true, false}) {
     if (!scheduled) recorded.schedule.reset();
     ExaminationSettings settings;
-    settings.cutoff = 10.;
+    settings.cutoff = 11.;
     settings.analysis.omega = 3.;
     settings.detection.contact_gain = 9.;
     settings.verdict.cop_force = 0.02;
     const MotionExamination found = examineMotion(clips.robot, recorded, settings);
 
-    const DerivedMotion derived = deriveMotion(clips.model, recorded, 10.);
+    const DerivedMotion derived = deriveMotion(clips.model, recorded, 11.);
     const Motion& motion = derived.motion;
     const PartRobot split = splitContacts(clips.robot);
     const auto contacts = computeContactMotions(clips.robot, motion);
@@ -116,7 +116,7 @@ BOOST_AUTO_TEST_CASE(an_examination_is_its_steps) {
     for (Index edge = 1; edge < motion.frames(); ++edge)
       if (schedule.active.col(edge).any() != schedule.active.col(edge - 1).any())
         for (Index frame = 0; frame < motion.frames(); ++frame)
-          if (frame >= edge - 6 && frame <= edge + 5) unsure[frame] = true;
+          if (frame >= edge - 5 && frame <= edge + 4) unsure[frame] = true;
     const MotionVerdict verdict = judgeMotion(robot, motion, recorded, motions, inference.ground,
                                               parts, settings.verdict, 0, unsure);
     const MotionAnalysis analysis = gatherParts(clips.robot, split, contacts, motions, parts);

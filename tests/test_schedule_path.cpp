@@ -244,15 +244,16 @@ class AllPaths {
   bool walk_sums_ = false;
 };
 
-// Sets that are surely improbable are not computed: each is taken for more probable than it is, by
-// at most exp(−7) of the most probable one.
-constexpr double kProbability = 0.02;
+// Where it is sure which sets a frame has, others are taken for as cheap as they may be, and so for
+// more probable than they are: in some frames by as much as this, on average by far less.
+constexpr double kWorst = 0.1, kMean = 0.002;
 
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(the_path_is_the_cheapest_of_all_and_probabilities_are_sums_over_all) {
   Random random(1);
   int changes = 0, unsure = 0;
+  double off = 0.;
   for (int trial = 0; trial < 120; ++trial) {
     const bool whole_limbs = trial % 2 == 0;
     Problem problem(random, whole_limbs ? std::vector<int>{0, 1, 2} : std::vector<int>{0, 0, 0, 1},
@@ -263,11 +264,13 @@ BOOST_AUTO_TEST_CASE(the_path_is_the_cheapest_of_all_and_probabilities_are_sums_
     const SchedulePath found = problem.find();
     const AllPaths all(problem);
     BOOST_TEST(close(all.cost(found.sets), all.least, 1e-5));
-    BOOST_TEST(close(found.probability, all.probability, kProbability));
+    BOOST_TEST(close(found.probability, all.probability, kWorst));
+    off += (found.probability - all.probability).cwiseAbs().mean() / 120.;
     for (std::size_t frame = 1; frame < found.sets.size(); ++frame)
       changes += found.sets[frame] != found.sets[frame - 1];
     unsure += ((all.probability.array() - 0.5).abs() < 0.4).any();
   }
+  BOOST_TEST(off < kMean);
   BOOST_TEST(changes > 40);
   BOOST_TEST(unsure > 20);
 }
@@ -288,7 +291,7 @@ BOOST_AUTO_TEST_CASE(known_contacts_stay_and_only_their_points_are_found) {
                    bool(found.sets[std::size_t(frame)] & known.masks[std::size_t(contact)]));
     const AllPaths all(problem, &known);
     BOOST_TEST(close(all.cost(found.sets), all.least, 1e-5));
-    BOOST_TEST(close(found.probability, all.probability, kProbability));
+    BOOST_TEST(close(found.probability, all.probability, kWorst));
   }
 }
 

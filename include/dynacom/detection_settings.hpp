@@ -87,7 +87,8 @@ struct DYNACOM_EXPORT DetectionSettings {
   /// What the beginning or end of a contact costs.
   double change = 4.5;
 
-  /// The ground's height under all contacts [m]; NaN if it is to be found.
+  /// The ground's height under all contacts [m]; NaN if it is to be found. What rests higher above
+  /// it than `same_ground` is in the air.
   double ground_height = std::numeric_limits<double>::quiet_NaN();
   /// Velocity of the ground, a treadmill's, in the world, level [m/s]; NaN if it is to be found.
   Eigen::Vector3d ground_velocity =

@@ -126,25 +126,36 @@ def _level_texts(robot: Robot, found: MotionExamination, known: dict[str, float]
 
 
 def _held_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
-    """Feet that are at rest where nothing was seen to carry them, none of their corners."""
+    """Feet, and corners of feet, that are at rest where nothing was seen to carry them."""
     time, active = found.analysis.time, np.asarray(found.schedule.active)
-    lowest: dict[str, tuple[float, Stance]] = {}
+    lowest: dict[tuple[str, bool], tuple[float, Stance]] = {}
+    tilted: dict[str, set[str]] = {}
     on_ground = [stance.height for stance in _used(found)]
     for stance in _stances(found):
         lasts = time[stance.behind - 1] - time[stance.first]
-        name = _name(robot, found, stance)
+        name, part = _name(robot, found, stance), found.parts[stance.part]
         if stance.on_ground or lasts < _HELD:
             continue
-        if active[stance.first : stance.behind, found.parts[stance.part].contact].all():
-            continue
-        if name not in lowest or stance.height < lowest[name][0]:
-            lowest[name] = (stance.height, stance)
-    for name, (height, stance) in lowest.items():
-        above = height - (np.median(on_ground) if on_ground else 0.0)
-        yield (
-            f"{name} rests {100.0 * above:.0f} cm up at {time[stance.first]:.2f} s, where nothing "
-            "was seen landed on, and so carries nothing: say by --schedule if there is a box."
-        )
+        # The rest of it carries.
+        is_tilted = bool(active[stance.first : stance.behind, part.contact].all())
+        if is_tilted:
+            tilted.setdefault(name, set()).add(part.name.removeprefix(f"{name}."))
+        key = name, is_tilted
+        if key not in lowest or stance.height < lowest[key][0]:
+            lowest[key] = stance.height, stance
+    ground = np.median(on_ground) if on_ground else 0.0
+    for (name, is_tilted), (height, stance) in lowest.items():
+        where = f"{100.0 * (height - ground):.0f} cm up at {time[stance.first]:.2f} s"
+        if is_tilted:
+            yield (
+                f"{name} is tilted: its {' and '.join(sorted(tilted[name]))} rest {where}, and "
+                "carry nothing."
+            )
+        else:
+            yield (
+                f"{name} rests {where}, where nothing was seen landed on, and so carries nothing: "
+                "say by --schedule if there is a box."
+            )
 
 
 def _disagreement_texts(found: MotionExamination) -> Iterator[str]:

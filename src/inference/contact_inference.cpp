@@ -149,8 +149,10 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
     for (Index frame = 0; frame < frames; ++frame) {
       found.schedule.active(Index(k), frame) = path.sets[static_cast<std::size_t>(frame)] >> k & 1u;
       const bool active = found.schedule.active(Index(k), frame);
-      if (active || !tracks[k].is_body)
-        found.ground(Index(k), frame) = findGround(rests[k], frame, active);
+      if (!active && tracks[k].is_body) continue;
+      found.ground(Index(k), frame) = std::isnan(settings.ground_height)
+                                          ? findGround(rests[k], frame, active)
+                                          : settings.ground_height;
     }
     for (const internal::Rest& rest : rests[k].list)
       found.stances.push_back({k, rest.first, rest.behind, rest.height, rest.on_ground});

@@ -105,10 +105,10 @@ class PathFinder {
   }
 
  private:
-  // How long a frame counts.
+  // How long a frame counts; one that is alone as long as one likes.
   double duration(Index frame) const {
     const Index last = time_.size() - 1;
-    if (last == 0) return 0.;
+    if (last == 0) return 1.;
     return 0.5 * (time_[std::min(frame + 1, last)] - time_[std::max<Index>(frame - 1, 0)]);
   }
 

@@ -190,8 +190,8 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
   if (!std::isnan(settings.ground_height)) {
     for (Rests& rests : all)
       for (Rest& rest : rests.list) {
+        rest.on_ground = rest.height <= settings.ground_height + settings.same_ground;
         rest.height = settings.ground_height;
-        rest.on_ground = true;
       }
     return all;
   }

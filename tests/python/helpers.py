@@ -287,7 +287,7 @@ def documentation(function: object) -> list[str]:
 
 
 #: What the parts of a sole are called.
-CORNERS = ("front_left", "front_right", "rear_left", "rear_right")
+CORNERS = ("front_left", "rear_left", "rear_right", "front_right")
 
 
 def documented_columns(root: Path, contacts: Sequence[str]) -> dict[str, str]:

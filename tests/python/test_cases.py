@@ -77,10 +77,11 @@ def test_on_the_edges_of_tilted_soles(cases):
         for side in ("left", "right"):
             assert report[f"contact.{name}.front_{side}.active"].all()
             assert not report[f"contact.{name}.rear_{side}.active"].any()
+        assert note(report, f"{name} is tilted: its rear_left and rear_right rest 10 cm up")
     worst = report.verdict.findings["cop_outside"].worst
     assert worst == pytest.approx(0.15, abs=0.005)
     # They are no feet that are held in the air.
-    assert not note(report, "carries nothing")
+    assert not note(report, "say by --schedule")
 
 
 def test_a_jump(cases):

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pinocchio as pin
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from dynacom import (
     DetectionSettings,
@@ -44,7 +44,7 @@ def test_results_do_not_depend_on_threads_or_on_what_was_before(talos, recorded)
 
 def test_settings_reach_what_they_are_for(talos, recorded):
     detection = DetectionSettings()
-    detection.ground_height = 0.5
+    detection.ground_height = 0.005
     verdict = VerdictSettings()
     verdict.residual_torque.limit = 0.0
     examiner = MotionExaminer(
@@ -53,7 +53,8 @@ def test_settings_reach_what_they_are_for(talos, recorded):
     found = examiner.examine(recorded)
     assert found.derived.cutoff == 5.0
     assert found.analysis.omega == 2.5
-    assert_array_equal(found.ground, [0.5, 0.5])
+    assert_allclose(found.ground, 0.005, rtol=0, atol=1e-12)
+    assert found.ground.shape == (len(found.analysis.time), 2)
     assert found.verdict.findings["residual_torque"].frames > 0
     assert [entry.cutoff for entry in found.sensitivity] == [2.5, 10.0]
 
