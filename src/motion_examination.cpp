@@ -59,7 +59,8 @@ double findMeanGround(const ContactInference& found, double otherwise) {
   Eigen::Index count = 0;
   for (Eigen::Index frame = 0; frame < found.ground.cols(); ++frame)
     for (Eigen::Index part = 0; part < found.ground.rows(); ++part)
-      if (found.schedule.active(part, frame)) {
+      // Contacts may be recorded where nothing ever rests, whose ground is not known.
+      if (found.schedule.active(part, frame) && !std::isnan(found.ground(part, frame))) {
         sum += found.ground(part, frame);
         ++count;
       }
