@@ -20,6 +20,11 @@ bp::object getInferred(const Examination& examination) {
 
 bp::list getSeats(const Examination& examination) { return toList(examination.seats); }
 
+std::shared_ptr<Seat> makeSeat(const std::string& link, Eigen::Index first, Eigen::Index behind,
+                               double height, double weight_share) {
+  return std::make_shared<Seat>(Seat{link, first, behind, height, weight_share});
+}
+
 std::string writeSeat(const Seat& seat) {
   return internal::concat("Seat(link='", seat.link, "', first=", seat.first,
                           ", behind=", seat.behind, ", height=", seat.height,
@@ -78,11 +83,15 @@ void exposeMotionExamination() {
       .def(PrintVisitor<CutoffSensitivity>(&writeSensitivity))
       .def(CopyVisitor<CutoffSensitivity>());
 
-  bp::class_<Seat>("Seat",
-                   "A link that is held still high above all ground that is known while contacts\n"
-                   "cannot give what the motion needs, and that could give the rest. Its force\n"
-                   "counts nowhere.",
-                   bp::no_init)
+  bp::class_<Seat, std::shared_ptr<Seat>>(
+      "Seat",
+      "A link that is held still high above all ground that is known while contacts\n"
+      "cannot give what the motion needs, and that could give the rest. Its force\n"
+      "counts nowhere.",
+      bp::no_init)
+      .def("__init__", bp::make_constructor(&makeSeat, bp::default_call_policies(),
+                                            (bp::arg("link"), bp::arg("first"), bp::arg("behind"),
+                                             bp::arg("height"), bp::arg("weight_share"))))
       .def_readonly("link", &Seat::link, "Its name")
       .def_readonly("first", &Seat::first, "Frame")
       .def_readonly("behind", &Seat::behind, "The frame after the last")

@@ -106,6 +106,8 @@ constexpr double kLeastGain = 0.1;
 // And they are looked for if something is missing in more of the frames than this: the verdict
 // bears as many.
 constexpr double kMuch = 0.02;
+// Who sits lacks more than this [m g], [m g m], where the seat is not known; who leans lacks less.
+constexpr double kSeated = 0.1;
 
 // How many points there may be at most, see inferContacts().
 constexpr std::size_t kMaximalParts = 32;
@@ -288,8 +290,11 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   found.ground = findGround(found.contacts, used.parts, found.part_motions, best.inference.ground);
   if (!settings.bodies.empty()) {
     const std::vector<double> levels = findLevels(best.inference);
-    const Eigen::Array<bool, Eigen::Dynamic, 1> missing =
-        findMissing(best.verdict, settings.verdict);
+    Eigen::Array<bool, Eigen::Dynamic, 1> missing(motion.frames());
+    missing.setConstant(false);
+    for (const MotionFault fault : {MotionFault::ResidualForce, MotionFault::ResidualTorque,
+                                    MotionFault::FlightWithSupportNeeded})
+      missing = missing || best.verdict[fault].measured.array() > kSeated;
     if (!levels.empty() && isMuch(missing))
       found.seats = internal::findSeats(settings.bodies, motion,
                                         {used, found.part_motions, schedule, best.analysis, missing,

@@ -302,6 +302,7 @@ def documented_columns(root: Path, contacts: Sequence[str]) -> dict[str, str]:
         name: unit.replace("²", "^2").replace("·", " ")
         for cell, unit in rows
         for name in re.findall(r"`([^`]+)`", cell)
+        if "<link>" not in name  # links that touch something are in no column of a walk
     }
     per_contact = {name: unit for name, unit in units.items() if "<name>" in name}
     frame = {name: unit for name, unit in units.items() if name not in per_contact}

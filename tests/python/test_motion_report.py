@@ -62,6 +62,7 @@ SUMMARY = [
     "ground",
     "ground_velocity",
     "contacts",
+    "bodies",
     "mean_vertical_force",
     "momentum_change",
     "unexplained",

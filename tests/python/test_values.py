@@ -91,6 +91,7 @@ def objects(talos, talos_standing, talos_motion):
         dynacom.compareMeasured(motion.v, motion.v),
         dynacom.BodyPoints("trunk", 1, [[0.0, 0.1, 0.2]], [0.05]),
         dynacom.CollisionPoints([], ["trunk.stl"]),
+        dynacom.Seat("pelvis", 3, 9, 0.45, 0.6),
     ]
     return {type(value).__qualname__: value for value in objects} | {
         "DistributionResult.Contact": result.contacts[0],
