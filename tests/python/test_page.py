@@ -152,6 +152,7 @@ def test_contacts_show_their_parts_and_how_sure_they_are(talos, hurried, tmp_pat
     path = tmp_path / "report.html"
     write_page(path, talos, q, arrays | more, summary)
     with open_page(path) as tab:
+        tab.wait_for_selector("#schedule .bars path", state="attached")
         bars = tab.evaluate(
             "document.getElementById('schedule').data.map(({base, x, y, marker, customdata}) =>"
             " ({base, x, y, opacity: marker.opacity, names: customdata.map((c) => c[2])}))"
