@@ -111,12 +111,14 @@ def test_every_setting_can_be_set_by_a_text():
         return found
 
     every = paths(AnalysisOptions().to_dict())
-    constants = len(every) - 2 - 3 - 7 * 2 - 7
+    constants = len(every) - 2 - 4 - 7 * 2 - 7
     assert constants == repr(DetectionSettings()).count("=") - 2 > 30
     for path in every:
         value, text = 0.51, "0.51"
         if path == "flat":
             value, text = False, "false"
+        elif path == "feet_only":
+            value, text = True, "true"
         elif path.endswith("ground_velocity"):
             value, text = [1.0, -0.5, 0.0], "[1, -0.5, 0]"
         # What has a least must not be less than it, and the other way round.
@@ -193,7 +195,7 @@ def test_the_last_counts(options):
         ("cutoff", ["setting must be NAME=VALUE", "got 'cutoff'"]),
         ("cutoff=", ["setting must be NAME=VALUE", "got 'cutoff='"]),
         ("", ["setting must be NAME=VALUE", "got ''"]),
-        ("=3", ["setting '=3'", "unknown setting ''", "cutoff, omega, flat, detection, verdict"]),
+        ("=3", ["setting '=3'", "unknown setting ''", "cutoff, omega, flat, feet_only, detection"]),
         ("speed=3", ["setting 'speed=3'", "unknown setting 'speed'", "expected cutoff"]),
         ("detection.mu=3", ["detection: unknown setting 'mu'", "expected rest_speed_part"]),
         ("verdict.feasible=3", ["verdict: unknown setting 'feasible'", "residual_force"]),
@@ -237,7 +239,7 @@ def test_errors_name_the_thing_and_change_nothing(options, text, parts):
     ("text", "parts"),
     [
         ("{", ["must be YAML"]),
-        ("[1]", ["must be a mapping with cutoff, omega, flat, detection, verdict", "got [1]"]),
+        ("[1]", ["must be a mapping with cutoff, omega, flat, feet_only", "got [1]"]),
         ("cutoff", ["must be a mapping with", "got 'cutoff'"]),
         ("1: 2", ["unknown setting 1", "expected cutoff"]),
         ("cutoff: 1\ncutoff: 2", ["must be YAML", "'cutoff' twice"]),

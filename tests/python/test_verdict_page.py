@@ -45,7 +45,7 @@ def names(cell: str) -> list[str]:
 def test_settings_and_their_defaults(text):
     """Each one once."""
     rows = table(text, "| setting | default")
-    values = {"": None, "true": True, "auto": "auto"}
+    values = {"": None, "true": True, "false": False, "auto": "auto"}
     documented = {
         names(cell)[0]: values[default] if default in values else float(default)
         for cell, default, _ in rows
