@@ -71,22 +71,43 @@ class Gatherer {
         minimal_force_(robot.getMinimalVerticalForce()),
         force_(Eigen::VectorXd::Zero(contact_->cols())) {}
 
-  void write(Eigen::Index frame, const DynaCoM::Vector6& wrench, MotionAnalysis::Contact& result) {
+  /// @param wrench  of its parts, about its origin, in its own axes
+  /// @param force   the same force in the world
+  void write(Eigen::Index frame, const DynaCoM::Vector6& wrench, const Eigen::Vector3d& force,
+             MotionAnalysis::Contact& result) {
     force_ = wrench.head(force_.size());
     contact_->applyForce(force_);
     const bool loaded = force_[2] >= minimal_force_;
-    const auto usage = [&](double value) { return loaded || std::isnan(value) ? value : 0.; };
     result.wrench.col(frame) = wrench;
     if (loaded)
       result.cop.col(frame) = contact_->getCoP();
     else
       result.cop.col(frame).setConstant(kNaN);
-    result.friction_usage[frame] = usage(contact_->getFrictionUsage());
-    result.yaw_usage[frame] = usage(contact_->getYawUsage());
     result.cop_margin[frame] = loaded ? contact_->getCoPMargin() : kNaN;
+    result.friction_usage[frame] = findFrictionUsage(force);
+    result.yaw_usage[frame] = findYawUsage(force);
   }
 
  private:
+  // Of a sole by the normal of the ground that its corners touch, which is not the sole's where
+  // that is tilted; the pyramid has the sole's axes.
+  double findFrictionUsage(const Eigen::Vector3d& force) const {
+    const auto* surface = dynamic_cast<const Contact6D*>(contact_.get());
+    const double own = contact_->getFrictionUsage();
+    if (std::isnan(own) || !surface)
+      return force_[2] >= minimal_force_ || std::isnan(own) ? own : 0.;
+    if (force.z() < minimal_force_) return 0.;
+    const Eigen::Vector2d along = force_.head<2>();
+    const double part = along.isZero(0.) ? 1. : along.lpNorm<Eigen::Infinity>() / along.norm();
+    return part * force.head<2>().norm() / (surface->getSettings().mu * force.z());
+  }
+  double findYawUsage(const Eigen::Vector3d& force) const {
+    const auto* surface = dynamic_cast<const Contact6D*>(contact_.get());
+    if (!surface || std::isnan(contact_->getYawUsage())) return kNaN;
+    if (force.z() < minimal_force_) return 0.;
+    return std::abs(force_[5]) / (surface->getSettings().gu * force.z());
+  }
+
   const std::shared_ptr<ContactBase> contact_;
   const double minimal_force_;
   Eigen::VectorXd force_;
@@ -266,7 +287,7 @@ MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
       const Eigen::Matrix3d axes = findRotation(contacts[k], frame).transpose();
       DynaCoM::Vector6 wrench;
       wrench << axes * wrenches[k].head<3>(), axes * wrenches[k].tail<3>();
-      gatherers[k].write(frame, wrench, gathered[k]);
+      gatherers[k].write(frame, wrench, wrenches[k].head<3>(), gathered[k]);
     }
   }
   const double least = robot.getMinimalVerticalForce();

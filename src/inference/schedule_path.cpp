@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -72,6 +73,14 @@ class PathFinder {
       mu_.push_back(point.mu);
     }
     limbs_.resize(static_cast<std::size_t>(limbs));
+    for (std::size_t points = 1; points < changes_[0].size(); ++points) {
+      const double one = settings.further_points * settings.change;
+      changes_[0][points] = one * double(points);
+      changes_[1][points] = one * double(points - 1) + settings.change;
+    }
+    for (const std::size_t whole : {0, 1})
+      for (std::size_t points = 0; points < changes_[0].size(); ++points)
+        factors_[whole][points] = float(std::exp(-changes_[whole][points]));
     limb_masks_.resize(limbs_.size(), 0);
     for (std::size_t k = 0; k < points.size(); ++k) {
       limbs_[static_cast<std::size_t>(points[k].limb)].push_back(static_cast<int>(k));
@@ -114,7 +123,17 @@ class PathFinder {
 
   double cost(std::size_t point, Index frame) const;
   FrameSets makeSets(Index frame) const;
-  double changeOf(Mask before, Mask after) const;
+  // By whether the whole limb begins or ends, and how many of its points change.
+  template <class Number>
+  using Table = std::array<std::array<Number, 33>, 2>;
+  template <class Number>
+  static Number find(const Table<Number>& table, Mask before, Mask after) {
+    return table[before == 0 || after == 0 ? 1 : 0]
+                [static_cast<std::size_t>(__builtin_popcount(before ^ after))];
+  }
+  // What a limb costs that changes from one set of its points to another, and its probability.
+  double changeOf(Mask before, Mask after) const { return find(changes_, before, after); }
+  float factorOf(Mask before, Mask after) const { return find(factors_, before, after); }
   bool look(Index frame, std::size_t number);
   bool lookAtProbable(Index frame);
   void compute(Index frame, std::size_t number);
@@ -132,6 +151,8 @@ class PathFinder {
   std::vector<double> mu_;
   std::vector<std::vector<int>> limbs_;  // points of each
   std::vector<Mask> limb_masks_;
+  Table<double> changes_ = {};
+  Table<float> factors_;
   std::vector<FrameSets> sets_;
   ConeProjection projection_;
   Eigen::Matrix3Xd levers_;
@@ -238,14 +259,6 @@ FrameSets PathFinder::makeSets(Index frame) const {
     sets.levels.push_back(std::move(masks));
   }
   return sets;
-}
-
-// What a limb costs that changes from one set of its points to another.
-double PathFinder::changeOf(Mask before, Mask after) const {
-  const int points = __builtin_popcount(before ^ after);
-  if (points == 0) return 0.;
-  const bool whole = before == 0 || after == 0;
-  return settings_.change * (settings_.further_points * (points - whole) + whole);
 }
 
 void PathFinder::compute(Index frame, std::size_t number) {
@@ -382,7 +395,7 @@ Eigen::MatrixXd PathFinder::findProbability() const {
       next.assign(below * to.size() * above, 0.f);
       for (std::size_t j = 0; j < to.size(); ++j)
         for (std::size_t i = 0; i < from.size(); ++i) {
-          const auto factor = float(std::exp(-changeOf(from[i], to[j])));
+          const float factor = factorOf(from[i], to[j]);
           for (std::size_t high = 0; high < above; ++high) {
             const std::size_t source = (high * from.size() + i) * below;
             const std::size_t target = (high * to.size() + j) * below;
