@@ -244,7 +244,7 @@ def clip_goals(clips, before):
         Goal(
             f"clips: {force} above today's",
             "none but what is named",
-            summed(larger, "clips are not"),
+            [*summed(others, "clips are not"), *named],
         ),
         Goal("clips: frames in contact faster than 1 m/s", "≤ 1 %", summed(slow, "clips")),
     ]

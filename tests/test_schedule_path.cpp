@@ -55,7 +55,7 @@ struct Problem {
   SchedulePath find(const KnownContacts* known = nullptr) const {
     std::vector<PointTrack> points;
     for (std::size_t k = 0; k < limbs.size(); ++k)
-      points.push_back({limbs[k], mu[k], position[k], velocity[k]});
+      points.push_back({limbs[k], mu[k], false, position[k], velocity[k]});
     return findSchedulePath(points, rests, scales, {com, force, torque}, kWeight, time, settings,
                             known);
   }
