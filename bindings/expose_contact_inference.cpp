@@ -69,7 +69,8 @@ void exposeContactInference() {
       "described where C++ declares it, and docs/truth.md has what it was tried against.");
   for (const Settings::Constant& constant : Settings::constants()) {
     double Settings::*field = constant.second;
-    settings.add_property(constant.first, bp::make_getter(field), bp::make_setter(field));
+    settings.add_property(constant.first, bp::make_getter(field), bp::make_setter(field),
+                          "A constant > 0: docs/verdict.md has its meaning, unit and default.");
   }
   settings
       .def_readwrite("ground_height", &Settings::ground_height,

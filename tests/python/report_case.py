@@ -156,6 +156,7 @@ def _summary(robot: Robot, arrays: Arrays, weight: float, omega: float) -> Summa
         ],
         "ground": {name: 0.0 for name in robot.contacts},
         "contacts": contacts,
+        "bodies": {},
         "mean_vertical_force": float(arrays["ground_force"][:, 2].mean() / weight),
         "measured": {},
     }
