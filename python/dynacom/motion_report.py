@@ -617,7 +617,8 @@ def _collect_arrays(
     arrays["status"] = np.array([status.name for status in analysis.status])
     arrays["fault"] = _faults_by_frame(found.verdict, options)
     confidence = found.schedule.confidence
-    for index, (contact, moved) in enumerate(zip(analysis.contacts, found.contacts, strict=True)):
+    ground, contacts = found.ground, found.contacts
+    for index, (contact, moved) in enumerate(zip(analysis.contacts, contacts, strict=True)):
         wrench = contact.wrench
         values = {
             "active": np.asarray(contact.active, dtype=bool),
@@ -630,7 +631,7 @@ def _collect_arrays(
             "cop_margin": contact.cop_margin,
             "position": moved.position,
             "rotation": moved.rotation,
-            "height": moved.height - found.ground[:, index],
+            "height": moved.height - ground[:, index],
             "speed": np.linalg.norm(moved.velocity, axis=1),
         }
         if contact.name in clip.forces:
@@ -642,7 +643,7 @@ def _collect_arrays(
             values["confidence"] = confidence[:, index]
         arrays |= {f"contact.{contact.name}.{name}": array for name, array in values.items()}
     for part, place in zip(analysis.parts, found.parts, strict=True):
-        if "." in part.name and place.contact < len(found.contacts):
+        if "." in part.name and place.contact < len(contacts):
             arrays[f"contact.{part.name}.active"] = np.asarray(part.active, dtype=bool)
     for index, body in enumerate(analysis.bodies):
         key = f"body.{body.link}"

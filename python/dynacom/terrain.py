@@ -27,9 +27,10 @@ def ground_heights(robot: Robot, found: MotionExamination) -> dict[str, float | 
     None where it never is.
     """
     heights = {}
+    # What C++ hands out is a copy: once is enough.
+    actives, ground = np.asarray(found.schedule.active), found.ground
     for index, name in enumerate(robot.contacts):
-        active = np.asarray(found.schedule.active)[:, index]
-        values = found.ground[active, index]
+        values = ground[actives[:, index], index]
         values = values[np.isfinite(values)]
         heights[name] = float(np.median(values)) if len(values) else None
     return heights
@@ -64,14 +65,18 @@ def _text(value: float, digits: int) -> str:
     return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
-def _name(robot: Robot, found: MotionExamination, stance: Stance) -> str:
-    return list(robot.contacts)[found.parts[stance.part].contact]
+def _owners(robot: Robot, found: MotionExamination) -> list[str | None]:
+    """The contact that each part belongs to; None for parts of other links."""
+    names = list(robot.contacts)
+    return [names[part.contact] if part.contact < len(names) else None for part in found.parts]
 
 
 def _stances(found: MotionExamination) -> Iterator[Stance]:
     """Those of contacts: other links rest anywhere."""
+    count = len(found.schedule.names)
+    of_contact = [part.contact < count for part in found.parts]
     for stance in found.inference.stances:
-        if found.parts[stance.part].contact < len(found.contacts):
+        if of_contact[stance.part]:
             yield stance
 
 
@@ -86,8 +91,9 @@ def _used(found: MotionExamination) -> Iterator[Stance]:
 def _slope_text(found: MotionExamination) -> str | None:
     """If the stances lie in a plane that is not level."""
     points = []
+    positions = [moved.position for moved in found.part_motions]
     for stance in _used(found):
-        position = found.part_motions[stance.part].position[stance.first : stance.behind]
+        position = positions[stance.part][stance.first : stance.behind]
         points.append([*position[:, :2].mean(axis=0), stance.height])
     points = np.array(points).reshape(-1, 3)
     if len(points) < 6 or np.ptp(points[:, 2]) <= _RISE:
@@ -107,8 +113,9 @@ def _slope_text(found: MotionExamination) -> str | None:
 
 def _level_texts(robot: Robot, found: MotionExamination, known: dict[str, float]) -> Iterator[str]:
     levels: dict[str, list[float]] = {}
+    owners = _owners(robot, found)
     for stance in _used(found):
-        own = levels.setdefault(_name(robot, found, stance), [])
+        own = levels.setdefault(owners[stance.part], [])
         if all(abs(stance.height - level) > _LEVEL for level in own):
             own.append(stance.height)
     steps = []
@@ -131,9 +138,10 @@ def _held_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
     lowest: dict[tuple[str, bool], tuple[float, Stance]] = {}
     tilted: dict[str, set[str]] = {}
     on_ground = [stance.height for stance in _used(found)]
+    owners, parts = _owners(robot, found), found.parts
     for stance in _stances(found):
         lasts = time[stance.behind - 1] - time[stance.first]
-        name, part = _name(robot, found, stance), found.parts[stance.part]
+        name, part = owners[stance.part], parts[stance.part]
         if stance.on_ground or lasts < _HELD:
             continue
         # The rest of it carries.
