@@ -124,6 +124,10 @@ void exposeContactInference() {
       .add_property("ground", &Rows<&ContactInference::ground>::get,
                     "Height of the ground under each of P parts, (T, P) [m]; NaN where there is\n"
                     "none")
+      .add_property("missing", &Rows<&ContactInference::missing>::get,
+                    "What the schedule cannot give of the wrench that the motion needs,\n"
+                    "frames x 2: the norms of the force [m g] and of the moment about the\n"
+                    "CoM [m g m].")
       .add_property("ground_velocity", getter(&ContactInference::ground_velocity),
                     "As given or found, (3,) [m/s]")
       .def(PrintVisitor<ContactInference>(&writeInference))

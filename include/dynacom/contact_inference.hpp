@@ -26,6 +26,9 @@ struct DYNACOM_EXPORT ContactInference {
   /// in which the part is active; on the way from one stance to the next the lower one's. NaN where
   /// there is none on the ground.
   Eigen::MatrixXd ground;
+  /// What the schedule cannot give of the wrench that the motion needs, 2 × frames: the norms of
+  /// the force [m g] and of the moment about the CoM [m g m].
+  Eigen::Matrix2Xd missing;
   /// Velocity of the ground, as given or found, in the world [m/s].
   Eigen::Vector3d ground_velocity = Eigen::Vector3d::Zero();
 };

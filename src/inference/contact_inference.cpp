@@ -143,6 +143,7 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
   found.ground_velocity = ground_velocity;
   found.schedule.active.resize(Index(count), frames);
   found.schedule.confidence = path.probability;
+  found.missing = path.missing;
   found.ground.setConstant(Index(count), frames, kNaN);
   for (std::size_t k = 0; k < count; ++k) {
     found.schedule.names.push_back(parts.parts[k].name);

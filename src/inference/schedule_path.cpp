@@ -108,8 +108,12 @@ class PathFinder {
         changed = lookAtProbable(frame) || changed;
     if (changed) found.probability = findProbability();
     found.sets.reserve(path.size());
-    for (std::size_t frame = 0; frame < path.size(); ++frame)
+    found.missing.resize(2, Index(path.size()));
+    for (std::size_t frame = 0; frame < path.size(); ++frame) {
       found.sets.push_back(sets_[frame].mask(path[frame]));
+      const auto missing = project(Index(frame), found.sets.back());
+      found.missing.col(Index(frame)) << missing.force, missing.torque;
+    }
     return found;
   }
 
@@ -136,6 +140,7 @@ class PathFinder {
   float factorOf(Mask before, Mask after) const { return find(factors_, before, after); }
   bool look(Index frame, std::size_t number);
   bool lookAtProbable(Index frame);
+  ConeProjection::Residual project(Index frame, Mask mask);
   void compute(Index frame, std::size_t number);
   std::vector<std::size_t> findCheapest() const;
   Eigen::MatrixXd findProbability() const;
@@ -261,16 +266,21 @@ FrameSets PathFinder::makeSets(Index frame) const {
   return sets;
 }
 
-void PathFinder::compute(Index frame, std::size_t number) {
-  FrameSets& sets = sets_[static_cast<std::size_t>(frame)];
+// What a set cannot give in a frame, in [m g] and [m g m].
+ConeProjection::Residual PathFinder::project(Index frame, Mask mask) {
   ConeProjection::Vector6 wrench;
   wrench << wrench_.force.col(frame), wrench_.torque.col(frame);
   for (std::size_t k = 0; k < points_.size(); ++k)
     levers_.col(Index(k)) = points_[k].position.col(frame) - wrench_.com.col(frame);
-  const auto missing = projection_.project(wrench, levers_, mu_, sets.mask(number));
-  const double force = missing.force / weight_, torque = missing.torque / weight_;
-  const double fine = force / scales_.force + torque / scales_.torque;
-  const double coarse = force / settings_.missing_force + torque / settings_.missing_torque;
+  return projection_.project(wrench / weight_, levers_, mu_, mask);
+}
+
+void PathFinder::compute(Index frame, std::size_t number) {
+  FrameSets& sets = sets_[static_cast<std::size_t>(frame)];
+  const auto missing = project(frame, sets.mask(number));
+  const double fine = missing.force / scales_.force + missing.torque / scales_.torque;
+  const double coarse =
+      missing.force / settings_.missing_force + missing.torque / settings_.missing_torque;
   sets.missing[number] =
       float(settings_.rate * duration(frame) * settings_.dynamics_weight *
             (std::min(fine, settings_.missing_greatest) + settings_.missing_factor * coarse));

@@ -25,6 +25,7 @@ struct KnownContacts {
 struct SchedulePath {
   std::vector<std::uint32_t> sets;  ///< in each frame a bit for each point that is active
   Eigen::MatrixXd probability;      ///< that a point is active; points × frames
+  Eigen::Matrix2Xd missing;         ///< what they cannot give: norms of force [m g], moment [m g m]
 };
 
 /// Finds the sets of active points through time that cost least: what where they are costs, what
