@@ -27,20 +27,35 @@ constexpr double kSure = 0.02, kImprobable = 7.;
 
 constexpr double kUnknown = -1.;  // what a set is missing, before it was computed
 
-// The sets of a frame: each takes of each limb a level, that is, so many of its cheapest points.
-// They are numbered in the manner of digits, the first limb's being the fastest.
+// A change of contact is as probable as its cost says in so long a time [s], and in a shorter frame
+// the less.
+constexpr double kChangeTime = 1. / 60.;
+
+// So many points of a limb, with what it costs that they are active where they are.
+struct Level {
+  Mask mask;
+  float cost;
+};
+
+// What the points of each limb may do in a frame: nothing, or so many of its cheapest ones are
+// active.
+using Levels = std::vector<std::vector<Level>>;
+
+// The sets of a frame: each takes of each limb one of its levels. They are numbered in the manner of
+// digits, the first limb's being the fastest.
 struct FrameSets {
-  std::vector<std::vector<Mask>> levels;  // of each limb: sets of its points, the first is empty
-  std::vector<float> cost;                // of where the points are
-  std::vector<float> missing;             // cost of the dynamics; kUnknown before it is computed
-  float least_missing = 0.f;              // no set is missing less, as far as is known
+  Levels levels;
+  std::vector<float> cost;        // of where the points are
+  std::vector<float> missing;     // cost of the dynamics; kUnknown before it is computed
+  std::vector<float> likelihood;  // of the costs, but for a factor
+  float least_missing = 0.f;      // no set is missing less, as far as is known
 
   std::size_t size() const { return cost.size(); }
 
   Mask mask(std::size_t number) const {
     Mask mask = 0;
-    for (const std::vector<Mask>& limb : levels) {
-      mask |= limb[number % limb.size()];
+    for (const std::vector<Level>& limb : levels) {
+      mask |= limb[number % limb.size()].mask;
       number /= limb.size();
     }
     return mask;
@@ -50,6 +65,40 @@ struct FrameSets {
   float total(std::size_t number) const {
     return cost[number] + std::max(least_missing, missing[number]);
   }
+  std::size_t findCheapest() const {
+    std::size_t best = 0;
+    for (std::size_t number = 1; number < size(); ++number)
+      if (total(number) < total(best)) best = number;
+    return best;
+  }
+};
+
+// What changes of a limb's points cost: by whether the whole limb begins or ends, and how many of
+// its points change. It is a metric: no way is longer than one with a stop.
+class Changes {
+ public:
+  Changes(double change, double further) {
+    for (std::size_t points = 1; points < costs_[0].size(); ++points) {
+      costs_[0][points] = float(further * change * double(points));
+      costs_[1][points] = float(further * change * double(points - 1) + change);
+    }
+  }
+
+  float cost(Mask before, Mask after) const {
+    std::size_t points = 0;
+    for (Mask rest = before ^ after; rest != 0; rest &= rest - 1) ++points;
+    return costs_[before == 0 || after == 0 ? 1 : 0][points];
+  }
+
+ private:
+  std::array<std::array<float, 33>, 2> costs_ = {};
+};
+
+// The cheapest set of a frame by itself, and how much more others cost at least.
+struct Choice {
+  Mask set;
+  float gap;    // of the closest one
+  float ratio;  // by what it costs to change to it
 };
 
 class PathFinder {
@@ -66,6 +115,7 @@ class PathFinder {
         time_(time),
         settings_(settings),
         known_(known),
+        changes_(settings.change, settings.further_points),
         projection_(settings.lever) {
     int limbs = 0;
     for (const PointTrack& point : points) {
@@ -73,52 +123,40 @@ class PathFinder {
       mu_.push_back(point.mu);
     }
     limbs_.resize(static_cast<std::size_t>(limbs));
-    for (std::size_t points = 1; points < changes_[0].size(); ++points) {
-      const double one = settings.further_points * settings.change;
-      changes_[0][points] = one * double(points);
-      changes_[1][points] = one * double(points - 1) + settings.change;
-    }
-    for (const std::size_t whole : {0, 1})
-      for (std::size_t points = 0; points < changes_[0].size(); ++points)
-        factors_[whole][points] = float(std::exp(-changes_[whole][points]));
     limb_masks_.resize(limbs_.size(), 0);
     for (std::size_t k = 0; k < points.size(); ++k) {
       limbs_[static_cast<std::size_t>(points[k].limb)].push_back(static_cast<int>(k));
       limb_masks_[static_cast<std::size_t>(points[k].limb)] |= Mask(1) << k;
     }
     levers_.resize(3, Index(points.size()));
-    for (Index frame = 0; frame < time.size(); ++frame) sets_.push_back(makeSets(frame));
   }
 
   SchedulePath find() {
-    SchedulePath found;
-    std::vector<std::size_t> path;
-    for (bool is_done = false; !is_done;) {
-      path = findCheapest();
-      is_done = true;
-      for (Index frame = 0; frame < time_.size(); ++frame)
-        if (look(frame, path[static_cast<std::size_t>(frame)])) is_done = false;
+    const Index frames = time_.size();
+    found_.sets.resize(static_cast<std::size_t>(frames));
+    found_.probability.setZero(Index(points_.size()), frames);
+    const std::vector<bool> certain = chooseCertain();
+    for (Index first = 0; first < frames; ++first) {
+      if (certain[static_cast<std::size_t>(first)]) {
+        for (Mask rest = found_.sets[static_cast<std::size_t>(first)]; rest != 0; rest &= rest - 1)
+          found_.probability(__builtin_ctz(rest), first) = 1.;
+        continue;
+      }
+      Index behind = first;
+      while (behind < frames && !certain[static_cast<std::size_t>(behind)]) ++behind;
+      findBetween(first, behind);
+      first = behind - 1;
     }
-    found.probability = findProbability();
-    bool changed = false;
-    for (Index frame = 0; frame < time_.size(); ++frame)
-      if ((found.probability.col(frame).array() > kSure &&
-           found.probability.col(frame).array() < 1. - kSure)
-              .any())
-        changed = lookAtProbable(frame) || changed;
-    if (changed) found.probability = findProbability();
-    found.sets.reserve(path.size());
-    found.missing.resize(2, Index(path.size()));
-    for (std::size_t frame = 0; frame < path.size(); ++frame) {
-      found.sets.push_back(sets_[frame].mask(path[frame]));
-      const auto missing = project(Index(frame), found.sets.back());
-      found.missing.col(Index(frame)) << missing.force, missing.torque;
+    found_.missing.resize(2, frames);
+    for (Index frame = 0; frame < frames; ++frame) {
+      const auto missing = project(frame, found_.sets[static_cast<std::size_t>(frame)]);
+      found_.missing.col(frame) << missing.force, missing.torque;
     }
-    return found;
+    return std::move(found_);
   }
 
  private:
-  // How long a frame counts; one that is alone as long as one likes.
+  // How long a frame lasts; one that is alone as long as one likes.
   double duration(Index frame) const {
     const Index last = time_.size() - 1;
     if (last == 0) return 1.;
@@ -126,24 +164,21 @@ class PathFinder {
   }
 
   double cost(std::size_t point, Index frame) const;
-  FrameSets makeSets(Index frame) const;
-  // By whether the whole limb begins or ends, and how many of its points change.
-  template <class Number>
-  using Table = std::array<std::array<Number, 33>, 2>;
-  template <class Number>
-  static Number find(const Table<Number>& table, Mask before, Mask after) {
-    return table[before == 0 || after == 0 ? 1 : 0]
-                [static_cast<std::size_t>(__builtin_popcount(before ^ after))];
-  }
-  // What a limb costs that changes from one set of its points to another, and its probability.
-  double changeOf(Mask before, Mask after) const { return find(changes_, before, after); }
-  float factorOf(Mask before, Mask after) const { return find(factors_, before, after); }
-  bool look(Index frame, std::size_t number);
-  bool lookAtProbable(Index frame);
-  ConeProjection::Residual project(Index frame, Mask mask);
-  void compute(Index frame, std::size_t number);
-  std::vector<std::size_t> findCheapest() const;
-  Eigen::MatrixXd findProbability() const;
+  void makeLevels(Index frame, Levels& levels);
+  void makeSets(Index frame, FrameSets& sets);
+  ConeProjection::Residual project(Index frame, Mask set);
+  float computeMissing(Index frame, Mask set);
+  float changeOf(Mask before, Mask after) const;
+
+  Choice choose(Index frame);
+  Choice chooseAmongAll(Index frame);
+  std::vector<bool> chooseCertain();
+
+  void findBetween(Index first, Index behind);
+  bool look(FrameSets& sets, Index frame, std::size_t number);
+  bool lookAtProbable(FrameSets& sets, Index frame);
+  std::vector<std::size_t> findCheapestPath(std::size_t count);
+  void findProbability(Index first, Index behind);
 
   const std::vector<PointTrack>& points_;
   const std::vector<Rests>& rests_;
@@ -153,14 +188,21 @@ class PathFinder {
   const Eigen::VectorXd& time_;
   const DetectionSettings& settings_;
   const KnownContacts* const known_;
+  const Changes changes_;
   std::vector<double> mu_;
   std::vector<std::vector<int>> limbs_;  // points of each
   std::vector<Mask> limb_masks_;
-  Table<double> changes_ = {};
-  Table<float> factors_;
-  std::vector<FrameSets> sets_;
   ConeProjection projection_;
+  Index placed_ = -1;  // the frame of the levers
   Eigen::Matrix3Xd levers_;
+  std::vector<std::pair<double, int>> order_;  // of a limb's points
+  FrameSets one_;                              // of a frame by itself
+  // Of frames that are not certain, and of the certain ones before and behind them, which have one
+  // set.
+  std::vector<FrameSets> between_;
+  std::vector<std::vector<std::uint16_t>> origins_;
+  std::vector<std::vector<float>> forward_;
+  SchedulePath found_;
 };
 
 // Of a point in contact, from where it is and how it moves; infinite where nothing carries it.
@@ -190,26 +232,23 @@ double PathFinder::cost(std::size_t index, Index frame) const {
          std::min(settings_.coarse_factor * coarse, settings_.coarse_greatest);
 }
 
-FrameSets PathFinder::makeSets(Index frame) const {
-  struct Level {
-    Mask mask;
-    double cost;
-  };
-  FrameSets sets;
-  std::vector<std::vector<Level>> levels;
+void PathFinder::makeLevels(Index frame, Levels& levels) {
+  const double scale = settings_.rate * duration(frame);
+  levels.resize(limbs_.size());
   std::size_t count = 1;
-  for (const std::vector<int>& limb : limbs_) {
-    std::vector<std::pair<double, int>> order;
-    for (const int point : limb) {
+  for (std::size_t limb = 0; limb < limbs_.size(); ++limb) {
+    order_.clear();
+    for (const int point : limbs_[limb]) {
       const double value = cost(static_cast<std::size_t>(point), frame);
-      if (std::isfinite(value)) order.emplace_back(value - settings_.contact_gain, point);
+      if (std::isfinite(value)) order_.emplace_back(value - settings_.contact_gain, point);
     }
-    std::sort(order.begin(), order.end());
-    std::vector<Level> own = {{0, 0.}};
-    for (std::size_t k = 0; k < order.size(); ++k) {
-      const double share = k == 0 ? 1. : settings_.further_points;
-      own.push_back(
-          {own.back().mask | Mask(1) << order[k].second, own.back().cost + share * order[k].first});
+    std::sort(order_.begin(), order_.end());
+    std::vector<Level>& own = levels[limb];
+    own.assign(1, {0, 0.f});
+    for (std::size_t k = 0; k < order_.size(); ++k) {
+      const double share = scale * (k == 0 ? 1. : settings_.further_points);
+      own.push_back({own.back().mask | Mask(1) << order_[k].second,
+                     own.back().cost + float(share * order_[k].first)});
     }
     if (known_) {
       const Mask possible = own.back().mask;
@@ -221,22 +260,21 @@ FrameSets PathFinder::makeSets(Index frame) const {
       own.erase(std::remove_if(own.begin(), own.end(), lacks), own.end());
     }
     count *= own.size();
-    levels.push_back(std::move(own));
   }
   // Too many: of the limb with the most levels only nothing, the cheapest, and all; and then of the
   // limb that would cost most, nothing.
   while (count > kMaximalSets) {
     const auto cheapest = [](const std::vector<Level>& limb) {
-      return std::min_element(limb.begin() + (limb.size() > 1), limb.end(),
-                              [](const Level& a, const Level& b) { return a.cost < b.cost; });
+      return *std::min_element(limb.begin() + (limb.size() > 1), limb.end(),
+                               [](const Level& a, const Level& b) { return a.cost < b.cost; });
     };
     auto most = std::max_element(levels.begin(), levels.end(),
                                  [](const auto& a, const auto& b) { return a.size() < b.size(); });
     if (most->size() > 3) {
-      *most = std::vector<Level>{most->front(), *cheapest(*most), most->back()};
+      *most = std::vector<Level>{most->front(), cheapest(*most), most->back()};
     } else {
       const auto value = [&](const std::vector<Level>& limb) {
-        return limb.size() < 2 ? -std::numeric_limits<double>::infinity() : cheapest(limb)->cost;
+        return limb.size() < 2 ? -std::numeric_limits<float>::infinity() : cheapest(limb).cost;
       };
       most = std::max_element(levels.begin(), levels.end(),
                               [&](const auto& a, const auto& b) { return value(a) < value(b); });
@@ -245,111 +283,240 @@ FrameSets PathFinder::makeSets(Index frame) const {
     count = 1;
     for (const auto& limb : levels) count *= limb.size();
   }
+}
 
-  const double scale = settings_.rate * duration(frame);
-  sets.cost.resize(count);
-  sets.missing.assign(count, float(kUnknown));
-  for (std::size_t number = 0; number < count; ++number) {
-    double sum = 0.;
-    std::size_t rest = number;
-    for (const auto& limb : levels) {
-      sum += limb[rest % limb.size()].cost;
-      rest /= limb.size();
-    }
-    sets.cost[number] = float(scale * sum);
+void PathFinder::makeSets(Index frame, FrameSets& sets) {
+  makeLevels(frame, sets.levels);
+  sets.cost.assign(1, 0.f);
+  for (const std::vector<Level>& limb : sets.levels) {
+    const std::size_t below = sets.cost.size();
+    sets.cost.resize(below * limb.size());
+    for (std::size_t level = limb.size(); level-- > 0;)
+      for (std::size_t low = 0; low < below; ++low)
+        sets.cost[level * below + low] = sets.cost[low] + limb[level].cost;
   }
-  for (const auto& limb : levels) {
-    std::vector<Mask> masks;
-    for (const Level& level : limb) masks.push_back(level.mask);
-    sets.levels.push_back(std::move(masks));
-  }
-  return sets;
+  sets.missing.assign(sets.size(), float(kUnknown));
+  sets.least_missing = 0.f;
 }
 
 // What a set cannot give in a frame, in [m g] and [m g m].
-ConeProjection::Residual PathFinder::project(Index frame, Mask mask) {
+ConeProjection::Residual PathFinder::project(Index frame, Mask set) {
+  if (placed_ != frame)
+    for (std::size_t k = 0; k < points_.size(); ++k)
+      levers_.col(Index(k)) = points_[k].position.col(frame) - wrench_.com.col(frame);
+  placed_ = frame;
   ConeProjection::Vector6 wrench;
   wrench << wrench_.force.col(frame), wrench_.torque.col(frame);
-  for (std::size_t k = 0; k < points_.size(); ++k)
-    levers_.col(Index(k)) = points_[k].position.col(frame) - wrench_.com.col(frame);
-  return projection_.project(wrench / weight_, levers_, mu_, mask);
+  return projection_.project(wrench / weight_, levers_, mu_, set);
 }
 
-void PathFinder::compute(Index frame, std::size_t number) {
-  FrameSets& sets = sets_[static_cast<std::size_t>(frame)];
-  const auto missing = project(frame, sets.mask(number));
+// What that costs.
+float PathFinder::computeMissing(Index frame, Mask set) {
+  const auto missing = project(frame, set);
   const double fine = missing.force / scales_.force + missing.torque / scales_.torque;
   const double coarse =
       missing.force / settings_.missing_force + missing.torque / settings_.missing_torque;
-  sets.missing[number] =
-      float(settings_.rate * duration(frame) * settings_.dynamics_weight *
-            (std::min(fine, settings_.missing_greatest) + settings_.missing_factor * coarse));
+  return float(settings_.rate * duration(frame) * settings_.dynamics_weight *
+               (std::min(fine, settings_.missing_greatest) + settings_.missing_factor * coarse));
+}
+
+float PathFinder::changeOf(Mask before, Mask after) const {
+  float sum = 0.f;
+  for (const Mask limb : limb_masks_) sum += changes_.cost(before & limb, after & limb);
+  return sum;
+}
+
+// The cheapest set of a frame: of each limb what costs least where it is, if that can give what is
+// needed, or as much as all points together: cones are nested.
+Choice PathFinder::choose(Index frame) {
+  Levels& levels = one_.levels;
+  makeLevels(frame, levels);
+  const auto cheapest = [](const std::vector<Level>& limb) {
+    return std::min_element(limb.begin(), limb.end(),
+                            [](const Level& a, const Level& b) { return a.cost < b.cost; });
+  };
+  Choice choice = {0, std::numeric_limits<float>::infinity(), 0.f};
+  Mask all = 0;
+  for (const std::vector<Level>& limb : levels) {
+    choice.set |= cheapest(limb)->mask;
+    all |= limb.back().mask;
+  }
+  float excess = computeMissing(frame, choice.set);
+  if (excess > kNegligible && all != choice.set) excess -= computeMissing(frame, all);
+  if (all == choice.set || excess <= kNegligible) excess = 0.f;
+  choice.ratio = choice.gap;
+  for (const std::vector<Level>& limb : levels) {
+    const auto own = cheapest(limb);
+    for (auto other = limb.begin(); other != limb.end(); ++other) {
+      if (other == own) continue;
+      const float gap = other->cost - own->cost - excess;
+      choice.gap = std::min(choice.gap, gap);
+      choice.ratio = std::min(choice.ratio, gap / changes_.cost(own->mask, other->mask));
+    }
+  }
+  return choice.gap >= 0.f ? choice : chooseAmongAll(frame);
+}
+
+Choice PathFinder::chooseAmongAll(Index frame) {
+  FrameSets& sets = one_;
+  makeSets(frame, sets);
+  const std::size_t all = sets.size() - 1;
+  sets.missing[all] = computeMissing(frame, sets.mask(all));
+  sets.least_missing = sets.missing[all];
+  std::size_t best = sets.findCheapest();
+  while (sets.missing[best] < 0.f) {
+    sets.missing[best] = computeMissing(frame, sets.mask(best));
+    best = sets.findCheapest();
+  }
+  Choice choice = {sets.mask(best), std::numeric_limits<float>::infinity(), 0.f};
+  choice.ratio = choice.gap;
+  for (std::size_t other = 0; other < sets.size(); ++other) {
+    if (other == best) continue;
+    const float gap = sets.total(other) - sets.total(best);
+    choice.gap = std::min(choice.gap, gap);
+    choice.ratio = std::min(choice.ratio, gap / changeOf(choice.set, sets.mask(other)));
+  }
+  return choice;
+}
+
+// Writes the sets of the frames that every cheapest path passes, and says which these are.
+//
+// Where frames have the same cheapest set Y, one after the other, paths that are once in Y stay
+// there: each other set costs more, and changes are a metric, so that it is no longer to go to Y at
+// the first frame and to leave it at the last. A path that is in other sets all the time saves two
+// times the change from the closest of them to Y at most. So if the sum over the frames of how much
+// more others cost, by the cost of that change, is 2 and more, all cheapest paths are in Y. Certain
+// is what in addition is far from both ends: there other sets are not probable.
+std::vector<bool> PathFinder::chooseCertain() {
+  const auto frames = static_cast<std::size_t>(time_.size());
+  std::vector<bool> certain(frames, false);
+  std::vector<float> gaps(frames), ratios(frames);
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    const Choice choice = choose(Index(frame));
+    found_.sets[frame] = choice.set;
+    gaps[frame] = choice.gap;
+    ratios[frame] = choice.ratio;
+  }
+  for (std::size_t first = 0, behind = 0; first < frames; first = behind) {
+    float ratio = 0.f;
+    for (; behind < frames && found_.sets[behind] == found_.sets[first]; ++behind)
+      ratio += ratios[behind];
+    if (!(ratio >= 2.f)) continue;
+    float since = 0.f, until = 0.f;
+    for (std::size_t frame = first; frame < behind; ++frame)
+      certain[frame] = (since += gaps[frame]) >= kImprobable;
+    for (std::size_t frame = behind; frame-- > first && until < kImprobable;)
+      if ((until += gaps[frame]) < kImprobable) certain[frame] = false;
+  }
+  return certain;
+}
+
+// Finds the path through frames that are not certain, from and to those around them.
+void PathFinder::findBetween(Index first, Index behind) {
+  const Index from = std::max<Index>(first - 1, 0), to = std::min(behind + 1, time_.size());
+  const auto count = static_cast<std::size_t>(to - from);
+  if (between_.size() < count) between_.resize(count);
+  for (Index frame = from; frame < to; ++frame) {
+    FrameSets& sets = between_[static_cast<std::size_t>(frame - from)];
+    if (first <= frame && frame < behind) {
+      makeSets(frame, sets);
+      continue;
+    }
+    sets.levels.resize(limbs_.size());
+    for (std::size_t limb = 0; limb < limbs_.size(); ++limb)
+      sets.levels[limb].assign(
+          1, {found_.sets[static_cast<std::size_t>(frame)] & limb_masks_[limb], 0.f});
+    sets.cost.assign(1, 0.f);
+    sets.missing.assign(1, 0.f);
+    sets.least_missing = 0.f;
+  }
+
+  const auto forEach = [&](const auto& act) {
+    for (Index frame = first; frame < behind; ++frame)
+      act(between_[static_cast<std::size_t>(frame - from)], frame);
+  };
+  std::vector<std::size_t> path;
+  for (bool is_done = false; !is_done;) {
+    path = findCheapestPath(count);
+    is_done = true;
+    forEach([&](FrameSets& sets, Index frame) {
+      if (look(sets, frame, path[static_cast<std::size_t>(frame - from)])) is_done = false;
+    });
+  }
+  forEach([&](FrameSets& sets, Index frame) {
+    found_.sets[static_cast<std::size_t>(frame)] =
+        sets.mask(path[static_cast<std::size_t>(frame - from)]);
+  });
+
+  findProbability(from, to);
+  bool changed = false;
+  forEach([&](FrameSets& sets, Index frame) {
+    const auto probability = found_.probability.col(frame).array();
+    if ((probability > kSure && probability < 1. - kSure).any())
+      changed = lookAtProbable(sets, frame) || changed;
+  });
+  if (changed) findProbability(from, to);
 }
 
 // Computes what a set is missing, and if that is something, what those are that may be better, even
 // if the path had to leave this one for them and come back; says whether that was new.
-bool PathFinder::look(Index frame, std::size_t number) {
-  FrameSets& sets = sets_[static_cast<std::size_t>(frame)];
+bool PathFinder::look(FrameSets& sets, Index frame, std::size_t number) {
+  const auto compute = [&](std::size_t set) {
+    sets.missing[set] = computeMissing(frame, sets.mask(set));
+  };
   if (sets.missing[number] >= 0.f) return false;
-  compute(frame, number);
+  compute(number);
   if (sets.missing[number] <= kNegligible) return true;
   // Cones are nested: what all points together cannot give, no set can.
   const std::size_t all = sets.size() - 1;
-  if (sets.missing[all] < 0.f) compute(frame, all);
+  if (sets.missing[all] < 0.f) compute(all);
   sets.least_missing = sets.missing[all];
   if (sets.missing[number] - sets.least_missing <= kNegligible) return true;
   const Mask own = sets.mask(number);
   for (std::size_t other = 0; other < sets.size(); ++other) {
     if (sets.missing[other] >= 0.f) continue;
-    const Mask mask = sets.mask(other);
-    double way = 0.;
-    for (const Mask limb : limb_masks_) way += 2. * changeOf(own & limb, mask & limb);
-    if (sets.total(other) <= sets.total(number) + way) compute(frame, other);
+    const float way = 2.f * changeOf(own, sets.mask(other));
+    if (sets.total(other) <= sets.total(number) + way) compute(other);
   }
   return true;
 }
 
 // Computes what sets are missing that may be probable; says whether there was any.
-bool PathFinder::lookAtProbable(Index frame) {
-  FrameSets& sets = sets_[static_cast<std::size_t>(frame)];
+bool PathFinder::lookAtProbable(FrameSets& sets, Index frame) {
   bool changed = false;
-  float least = std::numeric_limits<float>::infinity();
-  for (std::size_t number = 0; number < sets.size(); ++number)
-    least = std::min(least, sets.total(number));
+  const float least = sets.total(sets.findCheapest());
   for (std::size_t number = 0; number < sets.size(); ++number)
     if (sets.missing[number] < 0.f && sets.total(number) <= least + kImprobable) {
-      compute(frame, number);
+      sets.missing[number] = computeMissing(frame, sets.mask(number));
       changed = true;
     }
   return changed;
 }
 
-// Viterbi's recursion. From one frame's sets to the next's limb by limb, since what changes cost is
-// a sum over limbs.
-std::vector<std::size_t> PathFinder::findCheapest() const {
-  const std::size_t frames = sets_.size();
-  std::vector<std::vector<std::uint16_t>> origins(frames);
+// Viterbi's recursion over the first of between_. From one frame's sets to the next's limb by limb,
+// since what changes cost is a sum over limbs: digits below the limb's are of the later frame
+// already, those above it still of the earlier one.
+std::vector<std::size_t> PathFinder::findCheapestPath(std::size_t count) {
+  if (origins_.size() < count) origins_.resize(count);
   std::vector<float> value, next;
   std::vector<std::uint16_t> origin, next_origin;
-  for (std::size_t frame = 0; frame < frames; ++frame) {
-    const FrameSets& sets = sets_[frame];
-    if (frame == 0) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const FrameSets& sets = between_[k];
+    if (k == 0) {
       value.assign(sets.size(), 0.f);
     } else {
-      const FrameSets& before = sets_[frame - 1];
-      origin.resize(before.size());
+      origin.resize(value.size());
       std::iota(origin.begin(), origin.end(), std::uint16_t(0));
-      // Digits below the limb's are of this frame already, those above it still of the one before.
+      const FrameSets& before = between_[k - 1];
       std::size_t below = 1, above = before.size();
       for (std::size_t limb = 0; limb < sets.levels.size(); ++limb) {
-        const auto& from = before.levels[limb];
-        const auto& to = sets.levels[limb];
+        const std::vector<Level>&from = before.levels[limb], &to = sets.levels[limb];
         above /= from.size();
         next.assign(below * to.size() * above, std::numeric_limits<float>::infinity());
         next_origin.resize(next.size());
         for (std::size_t j = 0; j < to.size(); ++j)
           for (std::size_t i = 0; i < from.size(); ++i) {
-            const auto change = float(changeOf(from[i], to[j]));
+            const float change = changes_.cost(from[i].mask, to[j].mask);
             for (std::size_t high = 0; high < above; ++high) {
               const std::size_t source = (high * from.size() + i) * below;
               const std::size_t target = (high * to.size() + j) * below;
@@ -364,48 +531,55 @@ std::vector<std::size_t> PathFinder::findCheapest() const {
         origin.swap(next_origin);
         below *= to.size();
       }
-      origins[frame] = origin;
+      origins_[k] = origin;
     }
     for (std::size_t number = 0; number < sets.size(); ++number)
       value[number] += sets.total(number);
     const float least = *std::min_element(value.begin(), value.end());
     for (float& number : value) number -= least;
   }
-  std::vector<std::size_t> path(frames);
-  if (frames == 0) return path;
-  path[frames - 1] = std::size_t(std::min_element(value.begin(), value.end()) - value.begin());
-  for (std::size_t frame = frames; --frame > 0;) path[frame - 1] = origins[frame][path[frame]];
+  std::vector<std::size_t> path(count);
+  path[count - 1] = std::size_t(std::min_element(value.begin(), value.end()) - value.begin());
+  for (std::size_t k = count; --k > 0;) path[k - 1] = origins_[k][path[k]];
   return path;
 }
 
 // The forward-backward recursion over the same costs, taken for negative logarithms of
-// probabilities.
-Eigen::MatrixXd PathFinder::findProbability() const {
-  const std::size_t frames = sets_.size();
-  Eigen::MatrixXd probability = Eigen::MatrixXd::Zero(Index(points_.size()), Index(frames));
-  std::vector<std::vector<float>> forward(frames);
-  const auto weigh = [&](std::vector<float>& value, const FrameSets& sets) {
-    float least = std::numeric_limits<float>::infinity();
-    for (std::size_t k = 0; k < sets.size(); ++k) least = std::min(least, sets.total(k));
+// probabilities; of the frames in between_, the first of which is given.
+void PathFinder::findProbability(Index first, Index behind) {
+  const auto count = static_cast<std::size_t>(behind - first);
+  if (forward_.size() < count) forward_.resize(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    FrameSets& sets = between_[k];
+    const float least = sets.total(sets.findCheapest());
+    sets.likelihood.resize(sets.size());
+    for (std::size_t number = 0; number < sets.size(); ++number)
+      sets.likelihood[number] = std::exp(least - sets.total(number));
+  }
+  const auto weigh = [](std::vector<float>& value, const FrameSets& sets) {
     float sum = 0.f;
-    for (std::size_t k = 0; k < sets.size(); ++k)
-      sum += value[k] *= std::exp(least - sets.total(k));
+    for (std::size_t number = 0; number < sets.size(); ++number)
+      sum += value[number] *= sets.likelihood[number];
     if (sum > 0.f)
       for (float& number : value) number /= sum;
     else
       std::fill(value.begin(), value.end(), 1.f / float(value.size()));
   };
-  const auto move = [&](std::vector<float>& value, const FrameSets& before, const FrameSets& sets) {
-    std::vector<float> next;
+  std::vector<float> next;
+  const auto move = [&](std::vector<float>& value, std::size_t k, std::size_t to_k) {
+    const FrameSets &before = between_[k], &after = between_[to_k];
+    const Index frame = first + Index(std::min(k, to_k));
+    const auto part = float((time_[frame + 1] - time_[frame]) / kChangeTime);
     std::size_t below = 1, above = before.size();
-    for (std::size_t limb = 0; limb < sets.levels.size(); ++limb) {
-      const auto& from = before.levels[limb];
-      const auto& to = sets.levels[limb];
+    for (std::size_t limb = 0; limb < after.levels.size(); ++limb) {
+      const std::vector<Level>&from = before.levels[limb], &to = after.levels[limb];
       above /= from.size();
       next.assign(below * to.size() * above, 0.f);
       for (std::size_t j = 0; j < to.size(); ++j)
         for (std::size_t i = 0; i < from.size(); ++i) {
-          const float factor = factorOf(from[i], to[j]);
+          const float factor = from[i].mask == to[j].mask
+                                   ? 1.f
+                                   : part * std::exp(-changes_.cost(from[i].mask, to[j].mask));
           for (std::size_t high = 0; high < above; ++high) {
             const std::size_t source = (high * from.size() + i) * below;
             const std::size_t target = (high * to.size() + j) * below;
@@ -417,36 +591,36 @@ Eigen::MatrixXd PathFinder::findProbability() const {
       below *= to.size();
     }
   };
-  for (std::size_t frame = 0; frame < frames; ++frame) {
-    std::vector<float>& value = forward[frame];
-    if (frame == 0) {
-      value.assign(sets_[0].size(), 1.f);
+  for (std::size_t k = 0; k < count; ++k) {
+    std::vector<float>& value = forward_[k];
+    if (k == 0) {
+      value.assign(between_[0].size(), 1.f);
     } else {
-      value = forward[frame - 1];
-      move(value, sets_[frame - 1], sets_[frame]);
+      value = forward_[k - 1];
+      move(value, k - 1, k);
     }
-    weigh(value, sets_[frame]);
+    weigh(value, between_[k]);
   }
   std::vector<float> backward;
-  for (std::size_t frame = frames; frame-- > 0;) {
-    const FrameSets& sets = sets_[frame];
-    if (frame + 1 == frames) {
+  for (std::size_t k = count; k-- > 0;) {
+    const FrameSets& sets = between_[k];
+    if (k + 1 == count) {
       backward.assign(sets.size(), 1.f);
     } else {
-      weigh(backward, sets_[frame + 1]);
-      move(backward, sets_[frame + 1], sets);
+      weigh(backward, between_[k + 1]);
+      move(backward, k + 1, k);
     }
     double sum = 0.;
-    for (std::size_t k = 0; k < sets.size(); ++k) {
-      const double value = double(forward[frame][k]) * double(backward[k]);
+    auto probability = found_.probability.col(first + Index(k));
+    probability.setZero();
+    for (std::size_t number = 0; number < sets.size(); ++number) {
+      const double value = double(forward_[k][number]) * double(backward[number]);
       sum += value;
-      for (Mask rest = sets.mask(k); rest != 0; rest &= rest - 1)
-        probability(__builtin_ctz(rest), Index(frame)) += value;
+      for (Mask rest = sets.mask(number); rest != 0; rest &= rest - 1)
+        probability[__builtin_ctz(rest)] += value;
     }
-    if (sum > 0.)
-      probability.col(Index(frame)) = (probability.col(Index(frame)) / sum).cwiseMin(1.);
+    if (sum > 0.) probability = (probability / sum).cwiseMin(1.);
   }
-  return probability;
 }
 
 }  // namespace
