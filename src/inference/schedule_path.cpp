@@ -22,7 +22,7 @@ constexpr std::size_t kMaximalSets = 256;
 // What costs no more than this is not worth looking for: it is a hundredth of a change of contact.
 constexpr double kNegligible = 0.05;
 // Sets are probable from here on; and those that cost this much more than the cheapest are not.
-constexpr double kProbable = 0.005, kImprobable = 7.;
+constexpr double kProbable = 0.005, kImprobable = 6.;
 
 // A change of contact is as probable as its cost says in so long a time [s], and in a shorter frame
 // the less.
@@ -85,6 +85,7 @@ class Changes {
   }
 
   float cost(Mask before, Mask after) const { return find(costs_, before, after); }
+  float least() const { return costs_[0][1]; }
   // In kChangeTime.
   float probability(Mask before, Mask after) const { return find(probabilities_, before, after); }
 
@@ -403,7 +404,7 @@ Choice PathFinder::chooseAmongAll(Index frame) {
 // the first frame and to leave it at the last. A path that is in other sets all the time saves two
 // times the change from the closest of them to Y at most. So if the sum over the frames of how much
 // more others cost, by the cost of that change, is 2 and more, all cheapest paths are in Y. Certain
-// is what in addition is far from both ends: there other sets are not probable.
+// is where in addition other sets are not probable: far from both ends, and not worth a detour.
 std::vector<bool> PathFinder::chooseCertain() {
   const auto frames = static_cast<std::size_t>(time_.size());
   std::vector<bool> certain(frames, false);
@@ -420,8 +421,12 @@ std::vector<bool> PathFinder::chooseCertain() {
       ratio += ratios[behind];
     if (!(ratio >= 2.f)) continue;
     float since = 0.f, until = 0.f;
-    for (std::size_t frame = first; frame < behind; ++frame)
-      certain[frame] = (since += gaps[frame]) >= kImprobable;
+    for (std::size_t frame = first; frame < behind; ++frame) {
+      const double part = duration(Index(frame)) / kChangeTime;
+      const double there_and_back = 2. * (changes_.least() - std::log(part));
+      certain[frame] = (since += gaps[frame]) >= kImprobable &&
+                       double(gaps[frame]) + there_and_back >= kImprobable;
+    }
     for (std::size_t frame = behind; frame-- > first && until < kImprobable;)
       if ((until += gaps[frame]) < kImprobable) certain[frame] = false;
   }
