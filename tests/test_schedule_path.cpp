@@ -125,7 +125,7 @@ class AllPaths {
     if (known_) carries = known_->active(contactOf(k), frame);
     if (!carries) return kInfinity;
     const DetectionSettings& s = problem_.settings;
-    if (owner < 0) return s.fine_greatest + s.coarse_greatest - s.contact_gain;
+    if (owner < 0) return s.fine_excess + s.coarse_greatest;
     const double height =
         problem_.position[k](2, frame) - problem_.rests[k].list[std::size_t(owner)].height;
     Vector3d velocity = problem_.velocity[k].col(frame);
@@ -135,7 +135,7 @@ class AllPaths {
     const double speed = velocity.norm();
     return std::min(std::pow(off / problem_.scales.height, 2) +
                         std::pow(speed / problem_.scales.speed, 2),
-                    s.fine_greatest) +
+                    s.contact_gain + s.fine_excess) +
            std::min(s.coarse_factor *
                         (std::pow(off / s.coarse_height, 2) + std::pow(speed / s.coarse_speed, 2)),
                     s.coarse_greatest) -

@@ -222,7 +222,8 @@ double PathFinder::cost(std::size_t index, Index frame) const {
     for (std::size_t k = 0; k < known_->masks.size(); ++k)
       if (known_->masks[k] >> index & 1u) carries = known_->active(Index(k), frame);
   if (!carries) return std::numeric_limits<double>::infinity();
-  if (owner < 0) return settings_.fine_greatest + settings_.coarse_greatest;
+  const double fine_greatest = settings_.contact_gain + settings_.fine_excess;
+  if (owner < 0) return fine_greatest + settings_.coarse_greatest;
   const auto square = [](double value) { return value * value; };
   const double height =
       point.position(2, frame) - rests.list[static_cast<std::size_t>(owner)].height;
@@ -235,7 +236,7 @@ double PathFinder::cost(std::size_t index, Index frame) const {
       square(off / scales_.height) + (square(vertical) + horizontal) / square(scales_.speed);
   const double coarse = square(off / settings_.coarse_height) +
                         (square(vertical) + horizontal) / square(settings_.coarse_speed);
-  return std::min(fine, settings_.fine_greatest) +
+  return std::min(fine, fine_greatest) +
          std::min(settings_.coarse_factor * coarse, settings_.coarse_greatest);
 }
 
