@@ -86,7 +86,8 @@ std::vector<Rest> findRuns(const PointTrack& point, const Frames& counts,
     while (behind < frames && speed[behind] < slow) ++behind;
     if (behind == first) continue;
     const double step = frames > 1 ? (time[frames - 1] - time[0]) / double(frames - 1) : 0.;
-    if (time[behind - 1] - time[first] + step >= duration || behind - first == frames)
+    // By a little less, because times are rounded.
+    if (time[behind - 1] - time[first] + 1.01 * step >= duration || behind - first == frames)
       rests.push_back(makeRest(point, counts, first, behind));
   }
   return rests;
