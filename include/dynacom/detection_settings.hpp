@@ -31,7 +31,7 @@ struct DYNACOM_EXPORT DetectionSettings {
   /// Of a point's horizontal speed this part counts: soles drift more than they float.
   double horizontal_part = 0.4;
   /// How long a point is at rest at least [s].
-  double rest_duration = 0.03;
+  double rest_duration = 0.025;
   /// Rests between which a point moves no faster than three times the above, and whose heights
   /// differ by no more than this, are one [m].
   double same_rest = 0.01;
