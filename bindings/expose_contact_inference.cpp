@@ -199,6 +199,9 @@ void exposeContactInference() {
                     "What the schedule cannot give of the wrench that the motion needs,\n"
                     "frames x 2: the norms of the force [m g] and of the moment about the\n"
                     "CoM [m g m].")
+      .add_property("slope", getter(&ContactInference::slope),
+                    "The ground's gradient (dz/dx, dz/dy), (2,), where all stances of contacts\n"
+                    "lie in one plane that is not level; else zero")
       .add_property("ground_velocity", getter(&ContactInference::ground_velocity),
                     "As given or found, (3,) [m/s]")
       .def(PrintVisitor<ContactInference>(&writeInference))

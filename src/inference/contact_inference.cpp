@@ -8,6 +8,7 @@
 #include "../check.hpp"
 #include "../nan.hpp"
 #include "dynacom/contact_point.hpp"
+#include "ground_slope.hpp"
 #include "schedule_path.hpp"
 
 namespace dynacom {
@@ -87,6 +88,23 @@ internal::KnownContacts findKnown(const PartRobot& parts, const ContactSchedule&
   return known;
 }
 
+// Where contacts stand: the mean place of each stance in which its part is active at some time.
+Eigen::Matrix3Xd findFooting(const ContactInference& found,
+                             const std::vector<internal::PointTrack>& tracks) {
+  std::vector<Eigen::Vector3d> points;
+  for (const Stance& stance : found.stances) {
+    const internal::PointTrack& track = tracks[stance.part];
+    const Index count = stance.behind - stance.first;
+    if (track.is_body || !stance.on_ground ||
+        !found.schedule.active.row(Index(stance.part)).segment(stance.first, count).any())
+      continue;
+    points.push_back(track.position.middleCols(stance.first, count).rowwise().mean());
+    points.back().z() = stance.height;
+  }
+  return Eigen::Map<const Eigen::Matrix3Xd>(points.empty() ? nullptr : points[0].data(), 3,
+                                            Index(points.size()));
+}
+
 }  // namespace
 
 ContactInference inferContacts(const PartRobot& parts, const std::vector<ContactMotion>& motions,
@@ -158,6 +176,7 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
     for (const internal::Rest& rest : rests[k].list)
       found.stances.push_back({k, rest.first, rest.behind, rest.height, rest.on_ground});
   }
+  found.slope = internal::findGroundSlope(findFooting(found, tracks));
   found.schedule.readiness = findReadiness(found.schedule.active, time);
   return found;
 }
