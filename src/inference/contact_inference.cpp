@@ -22,14 +22,13 @@ constexpr std::size_t kMaximalParts = 32;
 // What forces are parts of where there is no gravity [m/s²].
 constexpr double kStandardGravity = 9.81;
 
-// A contact takes its load on, and gives it back, over so long [s], from and to this readiness.
-constexpr double kRamp = 0.1, kLeastReadiness = 0.3;
-
 // How readily parts bear load: less where their contact has just begun, or is about to end.
-Eigen::MatrixXd findReadiness(const ContactSchedule::Matrix& active, const Eigen::VectorXd& time) {
+Eigen::MatrixXd findReadiness(const ContactSchedule::Matrix& active, const Eigen::VectorXd& time,
+                              const DetectionSettings& settings) {
   Eigen::MatrixXd readiness = Eigen::MatrixXd::Ones(active.rows(), active.cols());
-  const auto ramp = [](double since) {
-    return kLeastReadiness + (1. - kLeastReadiness) * std::clamp(since / kRamp, 0., 1.);
+  const auto ramp = [&](double since) {
+    const double least = settings.ramp_least;
+    return least + (1. - least) * std::clamp(since / settings.ramp, 0., 1.);
   };
   for (Index part = 0; part < active.rows(); ++part) {
     double begin = -std::numeric_limits<double>::infinity(), end = -begin;
@@ -177,7 +176,7 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
       found.stances.push_back({k, rest.first, rest.behind, rest.height, rest.on_ground});
   }
   found.slope = internal::findGroundSlope(findFooting(found, tracks));
-  found.schedule.readiness = findReadiness(found.schedule.active, time);
+  found.schedule.readiness = findReadiness(found.schedule.active, time, settings);
   return found;
 }
 
