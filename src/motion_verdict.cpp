@@ -40,6 +40,8 @@ struct Description {
   const char* meaning;
 };
 constexpr Description kDescriptions[kMotionFaults] = {
+    {"downward_normal", &VerdictSettings::downward_normal, "rad",
+     "an active contact's normal points down, out of the robot"},
     {"residual_force", &VerdictSettings::residual_force, "m g",
      "the contacts cannot give the force"},
     {"residual_torque", &VerdictSettings::residual_torque, "m g m",
@@ -87,6 +89,17 @@ double groundAt(const Eigen::MatrixXd& ground, Eigen::Index k, Eigen::Index fram
 // How fast a contact moves along the ground in a frame.
 double slidingSpeed(const ContactMotion& contact, Eigen::Index frame) {
   return contact.velocity.col(frame).head<2>().norm();
+}
+
+// The vertical component of a contact's normal in a frame.
+double upwardNormal(const ContactMotion& contact, Eigen::Index frame) {
+  const auto rotation = contact.rotation.col(frame);
+  return 1. - 2. * (rotation[0] * rotation[0] + rotation[1] * rotation[1]);
+}
+
+// How far below the horizontal a contact's normal points in a frame [rad].
+double downwardAngle(const ContactMotion& contact, Eigen::Index frame) {
+  return std::asin(std::clamp(-upwardNormal(contact, frame), 0., 1.));
 }
 
 // Measures how far the centre of pressure that is needed lies outside what carries.
@@ -160,8 +173,7 @@ ContactNormal findNormal(const ContactMotion& contact, const Mask& active) {
   double up = 0., downward = 0.;
   for (Eigen::Index frame = 0; frame < active.size(); ++frame) {
     if (!active[frame]) continue;
-    const auto rotation = contact.rotation.col(frame);
-    const double z = 1. - 2. * (rotation[0] * rotation[0] + rotation[1] * rotation[1]);
+    const double z = upwardNormal(contact, frame);
     up += z;
     if (z < 0.) ++downward;
   }
@@ -357,6 +369,7 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
     return [&, support = SupportMeter(robot, contacts, analysis)](Eigen::Index first,
                                                                   Eigen::Index size) mutable {
       for (Eigen::Index frame = first; frame < first + size; ++frame) {
+        double& downward = measure(MotionFault::DownwardNormal)[frame];
         double& depth = measure(MotionFault::GroundPenetration)[frame];
         double& sliding = measure(MotionFault::FootSliding)[frame];
         bool flies = true;
@@ -364,6 +377,7 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
           depth = std::fmax(depth, findDepth(Eigen::Index(k), frame));
           if (!analysis.contacts[k].active[frame]) continue;
           flies = false;
+          downward = std::max(downward, downwardAngle(contacts[k], frame));
           if (!near_jumps[frame]) sliding = std::max(sliding, slidingSpeed(contacts[k], frame));
         }
         if (!verdict.unsure[frame]) judgeForces(frame, flies, support);
@@ -387,6 +401,11 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
         sumUp(measured[k], settings[fault], motion.time, [&](Eigen::Index frame) -> std::string {
           const double worst = measured[k][frame];
           if (fault == MotionFault::Discontinuity) return steps.fastest;
+          if (fault == MotionFault::DownwardNormal)
+            return nameContact([&](std::size_t i) {
+              return analysis.contacts[i].active[frame] &&
+                     downwardAngle(contacts[i], frame) == worst;
+            });
           if (fault == MotionFault::GroundPenetration)
             return nameContact(
                 [&](std::size_t i) { return findDepth(Eigen::Index(i), frame) == worst; });
