@@ -305,7 +305,8 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
   found.analysis =
       gatherParts(robot, used, found.contacts, found.part_motions, std::move(best.analysis));
   dropIdle(found.bodies, found.analysis.bodies);
-  found.verdict.normals = internal::findNormals(found.contacts, found.analysis.contacts);
+  internal::judgeNormals(found.contacts, found.analysis.contacts, motion.time, settings.verdict,
+                         found.verdict);
   found.statistics = summarizeMotion(robot, motion, found.analysis, found.verdict);
   for (const double cutoff : cutoffs) {
     const DerivedMotion other = rederiveMotion(robot.getModel(), recorded, cutoff);
@@ -317,6 +318,8 @@ MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded
     CutoffSensitivity sensitivity = {};
     sensitivity.cutoff = cutoff;
     sensitivity.verdict = judge(best, other, motions, other_analysis);
+    internal::judgeNormals(found.contacts, found.analysis.contacts, motion.time, settings.verdict,
+                           sensitivity.verdict);
     sensitivity.statistics = summarizeMotion(
         robot, other.motion,
         gatherParts(robot, used, internal::computeContactMotions(desks, other.motion, workers),

@@ -28,9 +28,11 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
                           const Eigen::Array<bool, Eigen::Dynamic, 1>& unsure,
                           const VerdictSettings& settings, Workers& workers);
 
-/// MotionVerdict::normals.
+/// Judges where normals point in a verdict of judgeMotion() that was made for other contacts: sets
+/// MotionVerdict::normals and what follows from DownwardNormal.
 /// @param contacts, analyzed  of the same contacts, in the same order
-std::vector<ContactNormal> findNormals(const std::vector<ContactMotion>& contacts,
-                                       const std::vector<MotionAnalysis::Contact>& analyzed);
+void judgeNormals(const std::vector<ContactMotion>& contacts,
+                  const std::vector<MotionAnalysis::Contact>& analyzed, const Eigen::VectorXd& time,
+                  const VerdictSettings& settings, MotionVerdict& verdict);
 
 }  // namespace dynacom::internal

@@ -91,17 +91,6 @@ double slidingSpeed(const ContactMotion& contact, Eigen::Index frame) {
   return contact.velocity.col(frame).head<2>().norm();
 }
 
-// The vertical component of a contact's normal in a frame.
-double upwardNormal(const ContactMotion& contact, Eigen::Index frame) {
-  const auto rotation = contact.rotation.col(frame);
-  return 1. - 2. * (rotation[0] * rotation[0] + rotation[1] * rotation[1]);
-}
-
-// How far below the horizontal a contact's normal points in a frame [rad].
-double downwardAngle(const ContactMotion& contact, Eigen::Index frame) {
-  return std::asin(std::clamp(-upwardNormal(contact, frame), 0., 1.));
-}
-
 // Measures how far the centre of pressure that is needed lies outside what carries.
 class SupportMeter {
  public:
@@ -169,16 +158,58 @@ MotionFinding sumUp(Eigen::VectorXd measured, const FaultLimit& limit, const Eig
   return {std::move(measured), beyond, worst, time[frame], holds, std::move(subject)};
 }
 
-ContactNormal findNormal(const ContactMotion& contact, const Mask& active) {
-  double up = 0., downward = 0.;
-  for (Eigen::Index frame = 0; frame < active.size(); ++frame) {
-    if (!active[frame]) continue;
-    const double z = upwardNormal(contact, frame);
-    up += z;
-    if (z < 0.) ++downward;
+// Where the normals of active contacts point: MotionVerdict::normals, and what is found of
+// DownwardNormal.
+void measureNormals(const std::vector<ContactMotion>& contacts,
+                    const std::vector<MotionAnalysis::Contact>& analyzed,
+                    const Eigen::VectorXd& time, const VerdictSettings& settings,
+                    MotionVerdict& verdict) {
+  verdict.normals.clear();
+  Eigen::VectorXd measured = Eigen::VectorXd::Zero(time.size());
+  std::vector<std::size_t> whose(static_cast<std::size_t>(time.size()));
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    double up = 0., downward = 0.;
+    for (Eigen::Index frame = 0; frame < time.size(); ++frame) {
+      if (!analyzed[k].active[frame]) continue;
+      const auto rotation = contacts[k].rotation.col(frame);
+      const double z = 1. - 2. * (rotation[0] * rotation[0] + rotation[1] * rotation[1]);
+      up += z;
+      if (!(z < 0.)) continue;
+      ++downward;
+      const double angle = std::asin(std::min(-z, 1.));
+      if (angle <= measured[frame]) continue;
+      measured[frame] = angle;
+      whose[static_cast<std::size_t>(frame)] = k;
+    }
+    const auto count = double(analyzed[k].active.count());
+    verdict.normals.push_back(count > 0. ? ContactNormal{up / count, downward / count}
+                                         : ContactNormal{kNaN, kNaN});
   }
-  const auto count = double(active.count());
-  return count > 0. ? ContactNormal{up / count, downward / count} : ContactNormal{kNaN, kNaN};
+  constexpr MotionFault fault = MotionFault::DownwardNormal;
+  verdict.findings[static_cast<std::size_t>(fault)] = sumUp(
+      std::move(measured), settings[fault], time,
+      [&](Eigen::Index frame) { return contacts[whose[static_cast<std::size_t>(frame)]].name; });
+}
+
+bool holdsAny(const MotionVerdict& verdict) {
+  return std::any_of(verdict.findings.begin(), verdict.findings.end(),
+                     [](const MotionFinding& finding) { return finding.holds; });
+}
+
+// Outcome and windows of what was found.
+void conclude(const Eigen::VectorXd& time, const VerdictSettings& settings,
+              MotionVerdict& verdict) {
+  verdict.outcome = holdsAny(verdict) ? MotionOutcome::NotFeasible : MotionOutcome::Feasible;
+  Mask beyond = Mask::Constant(time.size(), false);
+  for (std::size_t k = 0; k < kMotionFaults; ++k)
+    beyond = beyond ||
+             verdict.findings[k].measured.array() > settings[static_cast<MotionFault>(k)].limit;
+  const Mask jumped =
+      verdict[MotionFault::Discontinuity].measured.array() > settings.discontinuity.limit;
+  verdict.windows = internal::findWindows(time, beyond, jumped, settings);
+  Eigen::Index inside = 0;
+  for (const MotionWindow& window : verdict.windows) inside += window.last - window.first + 1;
+  verdict.feasible_share = double(inside) / double(time.size());
 }
 
 bool isRecorded(const Motion& motion, const RecordedMotion& recorded) {
@@ -311,13 +342,16 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
                                settings, workers);
 }
 
-std::vector<ContactNormal> internal::findNormals(
-    const std::vector<ContactMotion>& contacts,
-    const std::vector<MotionAnalysis::Contact>& analyzed) {
-  std::vector<ContactNormal> normals;
-  for (std::size_t k = 0; k < contacts.size(); ++k)
-    normals.push_back(findNormal(contacts[k], analyzed[k].active));
-  return normals;
+void internal::judgeNormals(const std::vector<ContactMotion>& contacts,
+                            const std::vector<MotionAnalysis::Contact>& analyzed,
+                            const Eigen::VectorXd& time, const VerdictSettings& settings,
+                            MotionVerdict& verdict) {
+  measureNormals(contacts, analyzed, time, settings, verdict);
+  // Too few frames stay too few.
+  const bool is_known = verdict.outcome != MotionOutcome::Unknown || time.size() >= kMinimalFrames;
+  if (is_known && verdict[MotionFault::DownwardNormal].frames > 0 &&
+      (verdict.outcome != MotionOutcome::Unknown || holdsAny(verdict)))
+    conclude(time, settings, verdict);
 }
 
 MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
@@ -369,7 +403,6 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
     return [&, support = SupportMeter(robot, contacts, analysis)](Eigen::Index first,
                                                                   Eigen::Index size) mutable {
       for (Eigen::Index frame = first; frame < first + size; ++frame) {
-        double& downward = measure(MotionFault::DownwardNormal)[frame];
         double& depth = measure(MotionFault::GroundPenetration)[frame];
         double& sliding = measure(MotionFault::FootSliding)[frame];
         bool flies = true;
@@ -377,7 +410,6 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
           depth = std::fmax(depth, findDepth(Eigen::Index(k), frame));
           if (!analysis.contacts[k].active[frame]) continue;
           flies = false;
-          downward = std::max(downward, downwardAngle(contacts[k], frame));
           if (!near_jumps[frame]) sliding = std::max(sliding, slidingSpeed(contacts[k], frame));
         }
         if (!verdict.unsure[frame]) judgeForces(frame, flies, support);
@@ -397,15 +429,11 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
   };
   for (std::size_t k = 0; k < kMotionFaults; ++k) {
     const auto fault = static_cast<MotionFault>(k);
+    if (fault == MotionFault::DownwardNormal) continue;
     verdict.findings[k] =
         sumUp(measured[k], settings[fault], motion.time, [&](Eigen::Index frame) -> std::string {
           const double worst = measured[k][frame];
           if (fault == MotionFault::Discontinuity) return steps.fastest;
-          if (fault == MotionFault::DownwardNormal)
-            return nameContact([&](std::size_t i) {
-              return analysis.contacts[i].active[frame] &&
-                     downwardAngle(contacts[i], frame) == worst;
-            });
           if (fault == MotionFault::GroundPenetration)
             return nameContact(
                 [&](std::size_t i) { return findDepth(Eigen::Index(i), frame) == worst; });
@@ -417,24 +445,13 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
           return "";
         });
   }
-  verdict.normals = internal::findNormals(contacts, analysis.contacts);
+  measureNormals(contacts, analysis.contacts, motion.time, settings, verdict);
 
   const bool is_too_short = frames < kMinimalFrames && !isRecorded(motion, recorded);
-  const bool any_holds = std::any_of(verdict.findings.begin(), verdict.findings.end(),
-                                     [](const MotionFinding& finding) { return finding.holds; });
-  if (is_too_short || (!any_holds && verdict.unsure.all())) {
+  if (is_too_short || (!holdsAny(verdict) && verdict.unsure.all()))
     verdict.outcome = MotionOutcome::Unknown;
-    return verdict;
-  }
-  verdict.outcome = any_holds ? MotionOutcome::NotFeasible : MotionOutcome::Feasible;
-  Mask beyond = Mask::Constant(frames, false);
-  for (std::size_t k = 0; k < kMotionFaults; ++k)
-    beyond = beyond || measured[k].array() > settings[static_cast<MotionFault>(k)].limit;
-  const Mask jumped = jumps.array() > settings.discontinuity.limit;
-  verdict.windows = findWindows(motion.time, beyond, jumped, settings);
-  Eigen::Index inside = 0;
-  for (const MotionWindow& window : verdict.windows) inside += window.last - window.first + 1;
-  verdict.feasible_share = double(inside) / double(frames);
+  else
+    conclude(motion.time, settings, verdict);
   return verdict;
 }
 

@@ -88,8 +88,8 @@ def missing_texts(
     if missing is not None:
         frames = statistics.frames
         yield (
-            f"A contact is missing in {missing['frames']} of {frames} frames, "
-            f"{_times_text(missing['times'])}: what may carry cannot give {_amount_text(missing)}. "
+            f"What may carry cannot give what the motion needs in {missing['frames']} of {frames} "
+            f"frames, {_times_text(missing['times'])}: up to {_amount_text(missing)}. "
             f"{_advice(found, options)}"
         )
     # A robot's description that is wrong says nothing of loads.
@@ -115,35 +115,34 @@ def unexplained(statistics: MotionStatistics) -> dict[str, Any]:
 def _times_text(times: list[list[float]]) -> str:
     texts = [f"from {begin:.2f} to {end:.2f} s" for begin, end in times[:_LISTED]]
     if (more := len(times) - _LISTED) > 0:
-        return f"{', '.join(texts)} and at {more} more times"
+        return f"{', '.join(texts)} and {more} more {'times' if more > 1 else 'time'}"
     *first, last = texts
     return f"{', '.join(first)} and {last}" if first else last
 
 
 def _amount_text(missing: dict[str, Any]) -> str:
-    text = (
-        f"up to {missing['force']:.2g} m g of the force and {missing['torque']:.2g} m g m of the "
-        "moment that the motion needs"
-    )
+    text = f"{missing['force']:.2g} m g of force and {missing['torque']:.2g} m g m of moment lack"
     if missing["distance"] > 0.0:
-        text += f", whose centre of pressure is up to {missing['distance']:.2g} m outside it"
+        text += (
+            f", and the centre of pressure is needed up to {missing['distance']:.2g} m outside it"
+        )
     return text
 
 
 def _advice(found: MotionExamination, options: AnalysisOptions) -> str:
-    """What may be done, if it is not the motion that is wrong."""
+    """What may be done."""
     if found.inferred is not None:
-        text = "Contacts are given: if they are wrong there, correct them"
+        text = "the given contacts are wrong there"
     elif found.seats:
-        text = "If there is a seat, a contact of the robot file on that link and --schedule tell it"
+        text = "there is a seat, which a contact of the robot file on that link and --schedule tell"
     else:
         text = (
-            "If a foot stands on a box there, --schedule tells of it; if another link rests on "
-            "something, a contact of the robot file with it"
+            "a contact is missing, which --schedule tells if a foot stands on a box, and with a "
+            "contact of the robot file if another link rests on something"
         )
     if options.feet_only:
-        text += "; without --feet-only, knees and hands may carry"
-    return f"{text}. Else the motion needs what no contact gives."
+        text += ", or --feet-only leaves out knees or hands"
+    return f"Either {text}; or the motion is too fast, or leans too far."
 
 
 def _is_load(statistics: MotionStatistics) -> bool:
