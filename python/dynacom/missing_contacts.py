@@ -92,8 +92,8 @@ def missing_texts(
             f"frames, {_times_text(missing['times'])}: up to {_amount_text(missing)}. "
             f"{_advice(found, options)}"
         )
-    # A robot's description that is wrong says nothing of loads.
-    if not is_reversed and _is_load(statistics):
+    # Neither a robot's description that is wrong nor a seat says anything of loads.
+    if not is_reversed and not found.seats and _is_load(statistics):
         force, torque = (
             ", ".join(f"{value:.3g}" for value in part)
             for part in statistics.mean_residual.reshape(2, 3).tolist()
@@ -121,7 +121,7 @@ def _times_text(times: list[list[float]]) -> str:
 
 
 def _amount_text(missing: dict[str, Any]) -> str:
-    text = f"{missing['force']:.2g} m g of force and {missing['torque']:.2g} m g m of moment lack"
+    text = f"{missing['force']:.2g} m g of force and {missing['torque']:.2g} m g m of moment are missing"
     if missing["distance"] > 0.0:
         text += (
             f", and the centre of pressure is needed up to {missing['distance']:.2g} m outside it"

@@ -43,8 +43,8 @@ class Gaps:
         what = (
             f"The frame after {first:.4g} s is missing: it was made from those around it"
             if count == 1
-            else f"Frames are missing, {count} in all, the first after {first:.4g} s: they were made from "
-            "those around them"
+            else f"Frames are missing, {count} in all, the first after {first:.4g} s: they were "
+            "made from those around them"
         )
         return f"{what}, so that frames are evenly spaced."
 
