@@ -121,7 +121,8 @@ def _times_text(times: list[list[float]]) -> str:
 
 
 def _amount_text(missing: dict[str, Any]) -> str:
-    text = f"{missing['force']:.2g} m g of force and {missing['torque']:.2g} m g m of moment are missing"
+    force, torque = missing["force"], missing["torque"]
+    text = f"{force:.2g} m g of force and {torque:.2g} m g m of moment are missing"
     if missing["distance"] > 0.0:
         text += (
             f", and the centre of pressure is needed up to {missing['distance']:.2g} m outside it"

@@ -93,6 +93,9 @@ def test_a_jump(cases):
     assert len(changes(flight)) == 2
     weight = report.summary["mass"] * 9.81
     assert np.abs(report["ground_force"][flight]).max() < 0.05 * weight
+    # Neither rounding in the air nor two frames are worth a word.
+    assert report.summary["contact_missing"] is None
+    assert not note(report, "cannot give")
 
 
 def test_a_slope(cases):
