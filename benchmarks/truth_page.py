@@ -199,12 +199,22 @@ def constant_table(figures, thresholds):
     return table(head, rows)
 
 
+def share_table(figures, thresholds):
+    shares = figures["shares"]
+    kinds = list(next(iter(shares.values())))
+    rows = [[name, *(f"{row[kind]:.1f}" for kind in kinds)] for name, row in shares.items()]
+    medians = (np.median([row[kind] for row in shares.values()]) for kind in kinds)
+    rows.append(["median", *(f"{median:.1f}" for median in medians)])
+    return table(["trial", *kinds], rows)
+
+
 TABLES = {
     "goals": goal_table,
     "changes": change_table,
     "feet": feet_table,
     "whole": whole_table,
     "filters": filter_table,
+    "shares": share_table,
     "statuses": status_table,
     "clips": clip_table,
     "walks": walk_table,
