@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from statistics import median
 
 from truth_goals import goals, ratios, shown_changes, shown_feet
 
@@ -203,8 +204,8 @@ def share_table(figures, thresholds):
     shares = figures["shares"]
     kinds = list(next(iter(shares.values())))
     rows = [[name, *(f"{row[kind]:.1f}" for kind in kinds)] for name, row in shares.items()]
-    medians = (np.median([row[kind] for row in shares.values()]) for kind in kinds)
-    rows.append(["median", *(f"{median:.1f}" for median in medians)])
+    medians = (median(row[kind] for row in shares.values()) for kind in kinds)
+    rows.append(["median", *(f"{value:.1f}" for value in medians)])
     return table(["trial", *kinds], rows)
 
 
