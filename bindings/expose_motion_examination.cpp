@@ -67,9 +67,11 @@ std::shared_ptr<MotionExaminer> makeExaminer(const DynaCoM& robot, double cutoff
   return std::make_shared<MotionExaminer>(robot, settings);
 }
 
-Examination examine(const MotionExaminer& examiner, const RecordedMotion& recorded) {
+// Not by value: what Python is given that way is copied.
+std::shared_ptr<Examination> examine(const MotionExaminer& examiner,
+                                     const RecordedMotion& recorded) {
   const WithoutLock without_lock;
-  return examiner.examine(recorded);
+  return std::make_shared<Examination>(examiner.examine(recorded));
 }
 
 }  // namespace
@@ -101,9 +103,9 @@ void exposeMotionExamination() {
       .def(PrintVisitor<Seat>(&writeSeat))
       .def(CopyVisitor<Seat>());
 
-  bp::class_<Examination>("MotionExamination",
-                          "All that was found of a recorded motion, see MotionExaminer.",
-                          bp::no_init)
+  bp::class_<Examination, std::shared_ptr<Examination>>(
+      "MotionExamination", "All that was found of a recorded motion, see MotionExaminer.",
+      bp::no_init)
       .def_readonly("derived", &Examination::derived, "The DerivedMotion")
       .add_property("contacts", &getContacts, "A ContactMotion for each contact")
       .add_property("parts", &getParts, "A PartRobot.Part for each part of the contacts")

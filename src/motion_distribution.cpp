@@ -63,12 +63,39 @@ Eigen::MatrixXd orderReadiness(const Carrier& carrier, const ContactSchedule& sc
 
 }  // namespace
 
+// One frame after the other.
+struct MotionDistribution::Solver {
+  explicit Solver(const Carrier& carrier) {
+    distribution.setWrenchWeights(carrier.wrench_weights);
+    distribution.setWarmStart(carrier.warm_start);
+    distribution.setMaximalIterations(carrier.maximal_iterations);
+    for (const FixedContact& fixed : carrier.contacts) {
+      const auto contact = fixed.contact->clone();
+      contact->setPose(pinocchio::SE3::Identity());
+      distribution.reserve(*contact, loads.size());
+      loads.push_back({contact, contact->getSurfacePose().inverse(), contact->reg_A(), 1.});
+    }
+  }
+
+  // A contact as this thread uses it.
+  struct Load {
+    std::shared_ptr<ContactBase> contact;
+    pinocchio::SE3 to_frame;  // from the surface
+    Eigen::VectorXd weights;  // of forces, as the carrier has them
+    double factor;            // by which the contact's are multiplied
+  };
+
+  WrenchDistribution distribution;
+  std::vector<Load> loads;
+};
+
 // What a thread does with blocks of frames.
 class MotionDistribution::Worker {
  public:
   Worker(const MotionDistribution& distribution, const std::vector<ContactMotion>& motions,
          const Eigen::MatrixXd& readiness, double ground_height, bool flat, MotionAnalysis& result)
-      : carrier_(distribution.carrier_),
+      : distribution_(distribution),
+        carrier_(distribution.carrier_),
         motions_(motions),
         readiness_(readiness),
         ground_height_(ground_height),
@@ -81,8 +108,7 @@ class MotionDistribution::Worker {
   void run(Eigen::Index first, Eigen::Index frames) {
     writeDefaults(first, frames);
     if (lanes_) lanes_->run(first, frames, motions_, readiness_, result_);
-    if (distribution_) distribution_->forgetAnswers();
-    was_active_.assign(carrier_.contacts.size(), false);
+    is_cold_ = true;
     for (Eigen::Index k = 0; k < frames; ++k) {
       const Eigen::Index frame = first + k;
       if (lanes_ && lanes_->isAnswered(k))
@@ -94,16 +120,9 @@ class MotionDistribution::Worker {
   }
 
  private:
-  // A contact as this thread uses it.
-  struct Load {
-    std::shared_ptr<ContactBase> contact;
-    pinocchio::SE3 to_frame;  // from the surface
-    Eigen::VectorXd weights;  // of forces, as the carrier has them
-    double factor;            // by which the contact's are multiplied
-  };
+  using Load = Solver::Load;
 
   void writeDefaults(Eigen::Index first, Eigen::Index frames);
-  void makeLoads();
   void setWeights(Load& load, double factor) const;
   void addActive(Eigen::Index frame);
   void distribute(Eigen::Index frame);
@@ -111,6 +130,7 @@ class MotionDistribution::Worker {
   Eigen::Vector2d findPressureCentre(Eigen::Index frame) const;
   void addPoints(Eigen::Index first, Eigen::Index frames);
 
+  const MotionDistribution& distribution_;
   const Carrier& carrier_;
   const std::vector<ContactMotion>& motions_;
   const Eigen::MatrixXd& readiness_;  // frames × contacts, or nothing
@@ -119,8 +139,8 @@ class MotionDistribution::Worker {
   MotionAnalysis& result_;
   std::optional<LaneSharer> lanes_;
   // For what the lanes leave, as soon as there is any.
-  std::optional<WrenchDistribution> distribution_;
-  std::vector<Load> loads_;
+  std::shared_ptr<Solver> solver_;
+  bool is_cold_ = true;           // whether it has done nothing in this block
   std::vector<bool> was_active_;  // in the last distribution of this block
 };
 
@@ -134,19 +154,6 @@ void MotionDistribution::Worker::writeDefaults(Eigen::Index first, Eigen::Index 
     for (Eigen::VectorXd* values :
          {&contact.friction_usage, &contact.yaw_usage, &contact.cop_margin})
       values->segment(first, frames).setConstant(kNaN);
-  }
-}
-
-void MotionDistribution::Worker::makeLoads() {
-  distribution_.emplace();
-  distribution_->setWrenchWeights(carrier_.wrench_weights);
-  distribution_->setWarmStart(carrier_.warm_start);
-  distribution_->setMaximalIterations(carrier_.maximal_iterations);
-  for (const FixedContact& fixed : carrier_.contacts) {
-    const auto contact = fixed.contact->clone();
-    contact->setPose(pinocchio::SE3::Identity());
-    distribution_->reserve(*contact, loads_.size());
-    loads_.push_back({contact, contact->getSurfacePose().inverse(), contact->reg_A(), 1.});
   }
 }
 
@@ -166,43 +173,48 @@ void MotionDistribution::Worker::setWeights(Load& load, double factor) const {
 // Gives the distribution the contacts of a frame.
 void MotionDistribution::Worker::addActive(Eigen::Index frame) {
   bool changed = false;
-  for (std::size_t k = 0; k < loads_.size(); ++k) {
+  for (std::size_t k = 0; k < solver_->loads.size(); ++k) {
     const bool is_active = result_.contacts[k].active[frame];
     changed = changed || is_active != was_active_[k];
     was_active_[k] = is_active;
   }
-  if (changed) distribution_->forgetForces();
-  distribution_->clear();
-  for (std::size_t k = 0; k < loads_.size(); ++k) {
+  if (changed) solver_->distribution.forgetForces();
+  solver_->distribution.clear();
+  for (std::size_t k = 0; k < solver_->loads.size(); ++k) {
     if (!was_active_[k]) continue;
-    Load& load = loads_[k];
+    Load& load = solver_->loads[k];
     const pinocchio::SE3 surface(
         Eigen::Quaterniond(Eigen::Vector4d(motions_[k].rotation.col(frame))),
         motions_[k].position.col(frame));
     load.contact->updateNewtonEuler(result_.com.col(frame), surface * load.to_frame);
     setWeights(load,
                readiness_.size() > 0 ? 1. / std::sqrt(readiness_(frame, Eigen::Index(k))) : 1.);
-    distribution_->add(*load.contact, k);
+    solver_->distribution.add(*load.contact, k);
   }
 }
 
 void MotionDistribution::Worker::distribute(Eigen::Index frame) {
-  if (!distribution_) makeLoads();
+  if (!solver_) solver_ = distribution_.solvers_.take();
+  if (is_cold_) {
+    solver_->distribution.forgetAnswers();
+    was_active_.assign(solver_->loads.size(), false);
+    is_cold_ = false;
+  }
   addActive(frame);
   DynaCoM::Vector6 wrench;
   wrench << result_.ground_force.col(frame), result_.ground_torque.col(frame);
-  distribution_->solve(wrench, carrier_.mass * kStandardGravity);
+  solver_->distribution.solve(wrench, carrier_.mass * kStandardGravity);
 
-  const DistributionResult& found = distribution_->result();
+  const DistributionResult& found = solver_->distribution.result();
   result_.status[static_cast<std::size_t>(frame)] = found.status;
   result_.residual.col(frame) = found.residual;
   result_.feasible_acom.col(frame) = found.achieved.head<3>() / carrier_.mass + carrier_.gravity;
   result_.feasible_dam.col(frame) = found.achieved.tail<3>();
   std::size_t added = 0;
-  for (std::size_t k = 0; k < loads_.size(); ++k) {
+  for (std::size_t k = 0; k < solver_->loads.size(); ++k) {
     if (!was_active_[k]) continue;
-    loads_[k].contact->applyForce(found.contacts[added++].force);
-    write(loads_[k], frame, result_.contacts[k]);
+    solver_->loads[k].contact->applyForce(found.contacts[added++].force);
+    write(solver_->loads[k], frame, result_.contacts[k]);
   }
   const Eigen::Vector3d com = result_.com.col(frame);
   result_.cop.col(frame) =
@@ -231,9 +243,9 @@ void MotionDistribution::Worker::write(Load& load, Eigen::Index frame,
 Eigen::Vector2d MotionDistribution::Worker::findPressureCentre(Eigen::Index frame) const {
   Eigen::Vector2d moment = Eigen::Vector2d::Zero();
   double vertical_force = 0.;
-  for (std::size_t k = 0; k < loads_.size(); ++k) {
+  for (std::size_t k = 0; k < solver_->loads.size(); ++k) {
     if (!was_active_[k]) continue;
-    const ContactBase& contact = *loads_[k].contact;
+    const ContactBase& contact = *solver_->loads[k].contact;
     const Eigen::Vector2d cop = contact.getCoP();
     if (!cop.allFinite()) continue;
     const double force = result_.contacts[k].vertical_force[frame];
@@ -267,7 +279,11 @@ void MotionDistribution::Worker::addPoints(Eigen::Index first, Eigen::Index fram
 }
 
 MotionDistribution::MotionDistribution(const Carrier& carrier, int lanes)
-    : carrier_(carrier), lane_carrier_(LaneCarrier::make(carrier, lanes)) {}
+    : carrier_(carrier),
+      lane_carrier_(LaneCarrier::make(carrier, lanes)),
+      solvers_([&carrier] { return std::make_unique<Solver>(carrier); }) {}
+
+MotionDistribution::~MotionDistribution() = default;
 
 void MotionDistribution::run(const ContactSchedule& schedule,
                              const std::vector<ContactMotion>& contacts, double ground_height,

@@ -8,6 +8,7 @@
 #include "carrier.hpp"
 #include "dynacom/motion_analysis.hpp"
 #include "lane_analysis.hpp"
+#include "pool.hpp"
 #include "workers.hpp"
 
 namespace dynacom::internal {
@@ -19,6 +20,7 @@ class MotionDistribution {
   /// @param carrier  must outlive this
   /// @param lanes    as AnalysisSettings::lanes
   MotionDistribution(const Carrier& carrier, int lanes);
+  ~MotionDistribution();
 
   /// @param schedule       must be valid; a contact without schedule is never active
   /// @param contacts       how the carrier's contacts lie, of MotionSweep::run()
@@ -33,9 +35,11 @@ class MotionDistribution {
 
  private:
   class Worker;
+  struct Solver;
 
   const Carrier& carrier_;
   const std::optional<LaneCarrier> lane_carrier_;
+  mutable Pool<Solver> solvers_;  // for what the lanes leave
 };
 
 }  // namespace dynacom::internal

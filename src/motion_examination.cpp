@@ -12,6 +12,7 @@
 #include "check.hpp"
 #include "contact_split.hpp"
 #include "inference/contact_inference.hpp"
+#include "motion_derivation.hpp"
 #include "motion_distribution.hpp"
 #include "motion_judgement.hpp"
 #include "motion_sweep.hpp"
@@ -211,6 +212,7 @@ struct MotionExaminer::Office {
         names(robot.getKnownContacts()),
         split(internal::splitCarrier(robot)),
         data([this] { return std::make_unique<pinocchio::Data>(robot.getModel()); }),
+        com_sweep(robot.getModel(), {}, given_settings.analysis.lanes, data),
         sweep(robot.getModel(), listAll(robot, split), given_settings.analysis.lanes, data),
         distribution(split.carrier, given_settings.analysis.lanes),
         workers(given_settings.analysis.threads) {}
@@ -223,7 +225,7 @@ struct MotionExaminer::Office {
   const std::vector<std::string> names;  // of contacts
   const ContactSplit split;              // these, taken apart
   internal::DataPool data;
-  const internal::MotionSweep sweep;  // of the contacts, and of the parts
+  const internal::MotionSweep com_sweep, sweep;  // of nothing, and of contacts and parts
   const internal::MotionDistribution distribution;
   internal::Workers workers;
 
@@ -239,7 +241,7 @@ class MotionExaminer::Office::Case {
 
   MotionExamination examine() {
     MotionExamination found = {};
-    found.derived = deriveMotion(model(), recorded_, settings_.cutoff);
+    found.derived = internal::deriveMotion(derivation_, recorded_, settings_.cutoff);
     const std::vector<double> cutoffs = findOtherCutoffs(found.derived);
     passes_ = 2. + 2. * double(cutoffs.size());
     if (recorded_.schedule)
@@ -271,6 +273,16 @@ class MotionExaminer::Office::Case {
     return [this, before, frames](Eigen::Index done) {
       progress_((before + double(done) / frames) / passes_);
     };
+  }
+
+  Eigen::Matrix3Xd findCoM(const Eigen::MatrixXd& q) const {
+    const Eigen::MatrixXd rest = Eigen::MatrixXd::Zero(model().nv, q.cols());
+    const auto frames = double(q.cols());
+    std::vector<ContactMotion> nothing;
+    MotionAnalysis dynamics;
+    office_.com_sweep.run({Eigen::VectorXd::LinSpaced(q.cols(), 1., frames), q, rest, rest},
+                          office_.workers, nothing, &dynamics);
+    return std::move(dynamics.com);
   }
 
   std::vector<double> findOtherCutoffs(const DerivedMotion& derived) const {
@@ -414,7 +426,7 @@ class MotionExaminer::Office::Case {
   }
 
   CutoffSensitivity tryCutoff(double cutoff, const MotionExamination& found) {
-    const DerivedMotion derived = rederiveMotion(model(), recorded_, cutoff);
+    const DerivedMotion derived = internal::rederiveMotion(derivation_, recorded_, cutoff);
     SweptMotion swept = sweep(derived.motion);
     makeRelative(found.inference.ground_velocity, swept.parts);
     distribute(found.inference, swept);
@@ -431,6 +443,8 @@ class MotionExaminer::Office::Case {
   const RecordedMotion& recorded_;
   const ExaminationSettings& settings_;
   const std::function<void(double)>& progress_;
+  const internal::Derivation derivation_ = {
+      model(), office_.data, [this](const Eigen::MatrixXd& q) { return findCoM(q); }};
   double passes_ = 1., done_ = 0.;
   internal::StepSpeeds steps_;
   Mask near_jumps_;

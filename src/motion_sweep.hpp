@@ -14,9 +14,6 @@
 
 namespace dynacom::internal {
 
-/// Storage of Pinocchio's, which has megabytes.
-using DataPool = Pool<pinocchio::Data>;
-
 /// The first step of an analysis, which knows nothing of schedules and grounds: what a motion needs
 /// of them, and how contacts lie and move.
 class MotionSweep {

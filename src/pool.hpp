@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <pinocchio/multibody.hpp>
 #include <utility>
 #include <vector>
 
@@ -44,5 +45,8 @@ class Pool {
   std::vector<std::unique_ptr<Thing>> free_;  // with room for all
   std::size_t count_ = 0;
 };
+
+/// Storage of Pinocchio's, which has megabytes.
+using DataPool = Pool<pinocchio::Data>;
 
 }  // namespace dynacom::internal
