@@ -88,6 +88,18 @@ def analyze_sample(sample, data):
     return dynacom.analyze(data / sample.path, robot, sensitivity=False, **sample.options)
 
 
+def bound_force(report):
+    """RMS of the force [m g] that the feet cannot give if all of their parts carry all the time,
+    wherever they are: what no schedule of contacts can be far below."""
+    parts = dynacom.splitContacts(report.robot.dynacom())
+    motion = report.examination.derived.motion
+    names = [part.name for part in parts.parts]
+    always = dynacom.ContactSchedule(names, np.ones((len(motion.time), len(names)), bool))
+    residual = dynacom.analyzeMotion(parts.robot, motion, always).residual[:, :3]
+    weight = report.summary["mass"] * GRAVITY
+    return float(np.sqrt(np.mean(np.sum(np.square(residual), axis=1)))) / weight
+
+
 def score_sample(report):
     """Residuals [m g], [m g m]; in %, frames within the verdict's limits and of fast contact."""
     weight = report.summary["mass"] * GRAVITY
@@ -101,6 +113,7 @@ def score_sample(report):
     return {
         "frames": len(residual),
         "force_rms": report.summary["residual_force_rms"],
+        "force_bound": bound_force(report),
         "torque_rms": report.summary["residual_torque_rms"],
         "force_largest": float(residual[:, 0].max()),
         "within": share(int((residual <= LIMITS).all(axis=1).sum()), len(residual)),

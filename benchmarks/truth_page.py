@@ -124,6 +124,7 @@ def clip_table(figures, thresholds):
         "force: thresholds",
         "found",
         "ours / thresholds",
+        "all feet always",
         "moment: thresholds",
         "found",
     ]
@@ -143,7 +144,8 @@ def clip_table(figures, thresholds):
             continue
         ratio = f"{parts[name]:.2f}" if name in parts else NONE
         rows.append(
-            [name, *pair(name, "force_rms", ".3f"), ratio, *pair(name, "torque_rms", ".3f")]
+            [name, *pair(name, "force_rms", ".3f"), ratio, f"{row['force_bound']:.3f}"]
+            + pair(name, "torque_rms", ".3f")
             + [*pair(name, "force_largest", ".2f"), *pair(name, "within", ".0f")]
             + [f"{row['fast']:.1f} %", numbers([row["fastest"]], 2), ", ".join(row["codes"])]
         )

@@ -1,10 +1,81 @@
 // SPDX-License-Identifier: BSD-2-Clause
+#include <map>
+#include <string>
+
 #include "bindings.hpp"
 #include "dynacom/contact_inference.hpp"
 
 namespace dynacom::python {
 
 namespace {
+
+// What a constant of DetectionSettings is; empty if it is not described here. docs/verdict.md has
+// the same words, and a test makes sure that all are described.
+const char* getMeaning(const std::string& constant) {
+  static const std::map<std::string, const char*> all = {
+      {"rest_speed_part",
+       "A part is at rest below this part of the 95th percentile of its speeds, between a least "
+       "and a greatest"},
+      {"rest_speed_least", "The speed below which a part is at rest is no less than this [m/s]"},
+      {"rest_speed_greatest", "The speed below which a part is at rest is no more than this [m/s]"},
+      {"exact_rest_speed_least", "As rest_speed_least, of exact motions [m/s]"},
+      {"exact_rest_speed_greatest", "As rest_speed_greatest, of exact motions [m/s]"},
+      {"moving_speed", "A part moves from this speed on: percentiles are of what moves [m/s]"},
+      {"horizontal_part", "Of horizontal speeds so much counts: soles drift more than they float"},
+      {"rest_duration", "How long a rest is at least [s]"},
+      {"same_rest",
+       "Rests are one if their heights differ by no more, and the part is slow in between [m]"},
+      {"landing_height",
+       "From, or to, how high above a stance a part has to be seen for the stance to be on the "
+       "ground [m]"},
+      {"same_ground",
+       "A stance this close to one on the ground, or to the lowest, is on the ground, too [m]"},
+      {"exact_same_ground", "As same_ground, of exact motions [m]"},
+      {"body_reach",
+       "A link that is no contact may have touched what was within this below it [m]"},
+      {"body_ground",
+       "A link that is no contact is carried by what is no higher than this above the lowest "
+       "level, or within this of another [m]"},
+      {"height_scale_least",
+       "The scale of heights, their scatter in stances, is no less than this [m]"},
+      {"height_scale_greatest", "The scale of heights is no more than this [m]"},
+      {"speed_scale_part",
+       "The scale of speeds is so many times their median in stances, between a least and a "
+       "greatest"},
+      {"speed_scale_least", "The scale of speeds is no less than this [m/s]"},
+      {"speed_scale_greatest", "The scale of speeds is no more than this [m/s]"},
+      {"force_scale_part",
+       "The scale of forces is so many m g for each m/s of the scale of speeds, between a least "
+       "and a greatest [s/m]"},
+      {"force_scale_least", "The scale of forces is no less than this [m g]"},
+      {"force_scale_greatest", "The scale of forces is no more than this [m g]"},
+      {"lever", "The scale of moments is so many metres times that of forces [m]"},
+      {"contact_gain", "What a part in contact is worth: it costs as much less"},
+      {"fine_excess",
+       "The most that heights and speeds cost in the motion's scales beyond contact_gain"},
+      {"coarse_factor",
+       "What heights and speeds cost besides, in coarse_height and coarse_speed, is multiplied "
+       "by this"},
+      {"coarse_height", "The height that costs 1 in the coarse scale [m]"},
+      {"coarse_speed", "The speed that costs 1 in the coarse scale [m/s]"},
+      {"coarse_greatest", "The most that heights and speeds cost in the coarse scales"},
+      {"pressed_depth",
+       "Down to this far below its rest a part is pressed, which costs nothing [m]"},
+      {"missing_greatest", "The most that a missing wrench costs in the motion's scales"},
+      {"missing_factor",
+       "What a missing wrench costs besides, in missing_force and missing_torque, without a "
+       "most, is multiplied by this"},
+      {"missing_force", "The missing force that costs 1 in the coarse scale [m g]"},
+      {"missing_torque", "The missing moment that costs 1 in the coarse scale [m g m]"},
+      {"dynamics_weight", "What a missing wrench costs in all is multiplied by this"},
+      {"further_points",
+       "What parts of a limb that is in contact already cost and are worth is multiplied by this"},
+      {"rate", "All costs of a frame count so often in a second [1/s]"},
+      {"change", "What it costs that a contact begins or ends"},
+  };
+  const auto found = all.find(constant);
+  return found == all.end() ? "" : found->second;
+}
 
 bp::list getParts(const PartRobot& split) { return toList(split.parts); }
 
@@ -65,12 +136,12 @@ void exposeContactInference() {
   using Settings = DetectionSettings;
   bp::class_<Settings> settings(
       "DetectionSettings",
-      "The constants of inferContacts, in seconds, metres and parts of the weight m g. Each is\n"
-      "described where C++ declares it, and docs/truth.md has what it was tried against.");
+      "The constants of inferContacts, all > 0, in seconds, metres and parts of the weight m g.\n"
+      "docs/truth.md has what each was tried against.");
   for (const Settings::Constant& constant : Settings::constants()) {
     double Settings::*field = constant.second;
     settings.add_property(constant.first, bp::make_getter(field), bp::make_setter(field),
-                          "A constant > 0: docs/verdict.md has its meaning, unit and default.");
+                          getMeaning(constant.first));
   }
   settings
       .def_readwrite("ground_height", &Settings::ground_height,

@@ -136,8 +136,8 @@ void exposeMotionExamination() {
       "Judges recorded motions of one robot, a DynaCoM, which is copied: deriveMotion,\n"
       "computeContactMotions, inferContacts for the contacts' parts, analyzeMotion, gatherParts,\n"
       "judgeMotion and summarizeMotion, one after the other. The ground that the centre of\n"
-      "pressure lies on is the mean of those that are stood on. Threads and copies of the robot\n"
-      "are kept from one motion to the next.",
+      "pressure lies on is the mean of those that are stood on. Threads, solvers and storage are\n"
+      "kept from one motion to the next.",
       bp::no_init)
       .def("__init__",
            bp::make_constructor(

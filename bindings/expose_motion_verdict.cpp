@@ -102,6 +102,7 @@ void exposeMotionVerdict() {
   using Settings = VerdictSettings;
   bp::class_<Settings>("VerdictSettings",
                        "The limits of all faults of a motion, see MotionVerdict.")
+      .def_readwrite("downward_normal", &Settings::downward_normal, "[rad]")
       .def_readwrite("residual_force", &Settings::residual_force, "[m g]")
       .def_readwrite("residual_torque", &Settings::residual_torque, "[m g m]")
       .def_readwrite("cop_outside", &Settings::cop_outside, "[m]")
@@ -163,6 +164,7 @@ void exposeMotionVerdict() {
   bp::class_<MotionVerdict>(
       "MotionVerdict",
       "Whether a motion is feasible, and what speaks against it.\n\n"
+      "downward_normal: how far below the horizontal an active contact's normal points [rad];\n"
       "residual_force, residual_torque: what the contacts cannot give; cop_outside: how\n"
       "far the centre of pressure that is needed lies outside what carries;\n"
       "flight_with_support_needed: no contact is active, but something must be given;\n"

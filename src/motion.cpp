@@ -45,8 +45,8 @@ Eigen::Quaterniond exponential(const Eigen::Vector3d& rotation) {
   }
   double sine = 1., cosine = 1.;  // sin(x) / x, and cos(x)
   for (int k = 6; k >= 1; --k) {
-    sine = 1. - x2 / (2 * k * (2 * k + 1)) * sine;
-    cosine = 1. - x2 / (2 * k * (2 * k - 1)) * cosine;
+    sine = 1. - x2 * (1. / (2 * k * (2 * k + 1))) * sine;
+    cosine = 1. - x2 * (1. / (2 * k * (2 * k - 1))) * cosine;
   }
   exponential.vec() = 0.5 * sine * rotation;
   exponential.w() = cosine;

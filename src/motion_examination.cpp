@@ -385,6 +385,12 @@ class MotionExaminer::Office::Case {
         settings_.verdict, office_.workers);
   }
 
+  // Judges the normals of whole contacts, in a verdict about their parts.
+  void judgeNormals(const MotionExamination& found, MotionVerdict& verdict) const {
+    internal::judgeNormals(found.contacts, found.analysis.contacts, found.derived.motion.time,
+                           settings_.verdict, verdict);
+  }
+
   // Looks for seats where more is missing than who leans lacks.
   std::vector<Seat> findSeats(const ContactInference& inference, const SweptMotion& swept,
                               const MotionVerdict& verdict) const {
@@ -420,7 +426,7 @@ class MotionExaminer::Office::Case {
     dropIdle(found.bodies, found.analysis.bodies);
     found.contacts = std::move(swept.contacts);
     found.part_motions = std::move(swept.parts);
-    found.verdict.normals = internal::findNormals(found.contacts, found.analysis.contacts);
+    judgeNormals(found, found.verdict);
     found.statistics =
         summarizeMotion(office_.robot, found.derived.motion, found.analysis, found.verdict);
   }
@@ -431,6 +437,7 @@ class MotionExaminer::Office::Case {
     makeRelative(found.inference.ground_velocity, swept.parts);
     distribute(found.inference, swept);
     MotionVerdict verdict = judge(derived, found.inference, swept);
+    judgeNormals(found, verdict);
     MotionStatistics statistics =
         summarizeMotion(office_.robot, derived.motion,
                         internal::gatherParts(office_.robot, *split_, swept.contacts, swept.parts,

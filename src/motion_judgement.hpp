@@ -35,9 +35,11 @@ Eigen::Array<bool, Eigen::Dynamic, 1> findNearJumps(const Eigen::VectorXd& time,
 /// Whether there are fewer frames than kMinimalFrames, and their derivatives were computed.
 bool isTooShort(const Motion& motion, const RecordedMotion& recorded);
 
-/// MotionVerdict::normals.
+/// Judges where normals point in a verdict of judgeMotion() that was made for other contacts: sets
+/// MotionVerdict::normals and what follows from DownwardNormal.
 /// @param contacts, analyzed  of the same contacts, in the same order
-std::vector<ContactNormal> findNormals(const std::vector<ContactMotion>& contacts,
-                                       const std::vector<MotionAnalysis::Contact>& analyzed);
+void judgeNormals(const std::vector<ContactMotion>& contacts,
+                  const std::vector<MotionAnalysis::Contact>& analyzed, const Eigen::VectorXd& time,
+                  const VerdictSettings& settings, MotionVerdict& verdict);
 
 }  // namespace dynacom::internal

@@ -39,6 +39,8 @@ struct Description {
   const char* meaning;
 };
 constexpr Description kDescriptions[kMotionFaults] = {
+    {"downward_normal", &VerdictSettings::downward_normal, "rad",
+     "an active contact's normal points down, out of the robot"},
     {"residual_force", &VerdictSettings::residual_force, "m g",
      "the contacts cannot give the force"},
     {"residual_torque", &VerdictSettings::residual_torque, "m g m",
@@ -100,17 +102,58 @@ MotionFinding sumUp(Eigen::VectorXd measured, const FaultLimit& limit, const Eig
   return {std::move(measured), beyond, worst, time[frame], holds, std::move(subject)};
 }
 
-ContactNormal findNormal(const ContactMotion& contact, const Mask& active) {
-  double up = 0., downward = 0.;
-  for (Eigen::Index frame = 0; frame < active.size(); ++frame) {
-    if (!active[frame]) continue;
-    const auto rotation = contact.rotation.col(frame);
-    const double z = 1. - 2. * (rotation[0] * rotation[0] + rotation[1] * rotation[1]);
-    up += z;
-    if (z < 0.) ++downward;
+// Where the normals of active contacts point: MotionVerdict::normals, and what is found of
+// DownwardNormal.
+void measureNormals(const std::vector<ContactMotion>& contacts,
+                    const std::vector<MotionAnalysis::Contact>& analyzed,
+                    const Eigen::VectorXd& time, const VerdictSettings& settings,
+                    MotionVerdict& verdict) {
+  verdict.normals.clear();
+  Eigen::VectorXd measured = Eigen::VectorXd::Zero(time.size());
+  std::vector<std::size_t> whose(static_cast<std::size_t>(time.size()));
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    double up = 0., downward = 0.;
+    for (Eigen::Index frame = 0; frame < time.size(); ++frame) {
+      if (!analyzed[k].active[frame]) continue;
+      const auto rotation = contacts[k].rotation.col(frame);
+      const double z = 1. - 2. * (rotation[0] * rotation[0] + rotation[1] * rotation[1]);
+      up += z;
+      if (!(z < 0.)) continue;
+      ++downward;
+      const double angle = std::asin(std::min(-z, 1.));
+      if (angle <= measured[frame]) continue;
+      measured[frame] = angle;
+      whose[static_cast<std::size_t>(frame)] = k;
+    }
+    const auto count = double(analyzed[k].active.count());
+    verdict.normals.push_back(count > 0. ? ContactNormal{up / count, downward / count}
+                                         : ContactNormal{kNaN, kNaN});
   }
-  const auto count = double(active.count());
-  return count > 0. ? ContactNormal{up / count, downward / count} : ContactNormal{kNaN, kNaN};
+  constexpr MotionFault fault = MotionFault::DownwardNormal;
+  verdict.findings[static_cast<std::size_t>(fault)] = sumUp(
+      std::move(measured), settings[fault], time,
+      [&](Eigen::Index frame) { return contacts[whose[static_cast<std::size_t>(frame)]].name; });
+}
+
+bool holdsAny(const MotionVerdict& verdict) {
+  return std::any_of(verdict.findings.begin(), verdict.findings.end(),
+                     [](const MotionFinding& finding) { return finding.holds; });
+}
+
+// Outcome and windows of what was found.
+void conclude(const Eigen::VectorXd& time, const VerdictSettings& settings,
+              MotionVerdict& verdict) {
+  verdict.outcome = holdsAny(verdict) ? MotionOutcome::NotFeasible : MotionOutcome::Feasible;
+  Mask beyond = Mask::Constant(time.size(), false);
+  for (std::size_t k = 0; k < kMotionFaults; ++k)
+    beyond = beyond ||
+             verdict.findings[k].measured.array() > settings[static_cast<MotionFault>(k)].limit;
+  const Mask jumped =
+      verdict[MotionFault::Discontinuity].measured.array() > settings.discontinuity.limit;
+  verdict.windows = internal::findWindows(time, beyond, jumped, settings);
+  Eigen::Index inside = 0;
+  for (const MotionWindow& window : verdict.windows) inside += window.last - window.first + 1;
+  verdict.feasible_share = double(inside) / double(time.size());
 }
 
 bool isRecorded(const Motion& motion, const RecordedMotion& recorded) {
@@ -232,13 +275,16 @@ std::vector<std::string> MotionVerdict::getCodes() const {
   return codes;
 }
 
-std::vector<ContactNormal> internal::findNormals(
-    const std::vector<ContactMotion>& contacts,
-    const std::vector<MotionAnalysis::Contact>& analyzed) {
-  std::vector<ContactNormal> normals;
-  for (std::size_t k = 0; k < contacts.size(); ++k)
-    normals.push_back(findNormal(contacts[k], analyzed[k].active));
-  return normals;
+void internal::judgeNormals(const std::vector<ContactMotion>& contacts,
+                            const std::vector<MotionAnalysis::Contact>& analyzed,
+                            const Eigen::VectorXd& time, const VerdictSettings& settings,
+                            MotionVerdict& verdict) {
+  measureNormals(contacts, analyzed, time, settings, verdict);
+  // Too few frames stay too few.
+  const bool is_known = verdict.outcome != MotionOutcome::Unknown || time.size() >= kMinimalFrames;
+  if (is_known && verdict[MotionFault::DownwardNormal].frames > 0 &&
+      (verdict.outcome != MotionOutcome::Unknown || holdsAny(verdict)))
+    conclude(time, settings, verdict);
 }
 
 Mask internal::findNearJumps(const Eigen::VectorXd& time, const StepSpeeds& steps,
@@ -350,6 +396,7 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
   };
   for (std::size_t k = 0; k < kMotionFaults; ++k) {
     const auto fault = static_cast<MotionFault>(k);
+    if (fault == MotionFault::DownwardNormal) continue;
     verdict.findings[k] =
         sumUp(measured[k], settings[fault], time, [&](Eigen::Index frame) -> std::string {
           const double worst = measured[k][frame];
@@ -365,23 +412,11 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
           return "";
         });
   }
-  verdict.normals = findNormals(contacts, analysis.contacts);
-
-  const bool any_holds = std::any_of(verdict.findings.begin(), verdict.findings.end(),
-                                     [](const MotionFinding& finding) { return finding.holds; });
-  if (judged.is_too_short || (!any_holds && verdict.unsure.all())) {
+  measureNormals(contacts, analysis.contacts, time, settings, verdict);
+  if (judged.is_too_short || (!holdsAny(verdict) && verdict.unsure.all()))
     verdict.outcome = MotionOutcome::Unknown;
-    return verdict;
-  }
-  verdict.outcome = any_holds ? MotionOutcome::NotFeasible : MotionOutcome::Feasible;
-  Mask beyond = Mask::Constant(frames, false);
-  for (std::size_t k = 0; k < kMotionFaults; ++k)
-    beyond = beyond || measured[k].array() > settings[static_cast<MotionFault>(k)].limit;
-  const Mask jumped = jumps.array() > settings.discontinuity.limit;
-  verdict.windows = findWindows(time, beyond, jumped, settings);
-  Eigen::Index inside = 0;
-  for (const MotionWindow& window : verdict.windows) inside += window.last - window.first + 1;
-  verdict.feasible_share = double(inside) / double(frames);
+  else
+    conclude(time, settings, verdict);
   return verdict;
 }
 

@@ -413,6 +413,16 @@ BOOST_AUTO_TEST_CASE(normals_point_up_or_down_while_they_carry) {
   BOOST_TEST(normals[0].downward_share == 0.25);
   BOOST_TEST(close(normals[1].up, -1.));
   BOOST_TEST(normals[1].downward_share == 1.);
+  // That is a fault, by how far below the horizontal they point, and ends windows.
+  const MotionVerdict verdict = stand.judge();
+  const MotionFinding& downward = verdict[MotionFault::DownwardNormal];
+  BOOST_TEST(downward.holds);
+  BOOST_TEST(downward.frames == 25);
+  BOOST_TEST(close(downward.worst, 0.5 * M_PI, 1e-7));
+  BOOST_TEST(close(downward.time, 0.25));
+  BOOST_TEST(downward.subject == "sole0");
+  BOOST_TEST(downward.measured.head(25).isZero(0.));
+  BOOST_TEST(verdict.getCodes().front() == "downward_normal");
   stand.schedule.active.row(1).setConstant(false);
   normals = stand.judge().normals;
   BOOST_TEST(std::isnan(normals[1].up));

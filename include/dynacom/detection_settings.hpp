@@ -23,7 +23,7 @@ struct DYNACOM_EXPORT DetectionSettings {
 
   /// Speed [m/s] below which a point is at rest: this part of how fast it gets (the 95th percentile
   /// of its speeds above `moving_speed`), between a least and a greatest.
-  double rest_speed_part = 0.2, rest_speed_least = 0.04, rest_speed_greatest = 0.2;
+  double rest_speed_part = 0.2, rest_speed_least = 0.03, rest_speed_greatest = 0.2;
   /// The same bounds for exact motions, whose points are at rest where they stand [m/s].
   double exact_rest_speed_least = 0.02, exact_rest_speed_greatest = 0.05;
   /// From where on a point moves [m/s].
@@ -31,7 +31,7 @@ struct DYNACOM_EXPORT DetectionSettings {
   /// Of a point's horizontal speed this part counts: soles drift more than they float.
   double horizontal_part = 0.4;
   /// How long a point is at rest at least [s].
-  double rest_duration = 0.03;
+  double rest_duration = 0.025;
   /// Rests between which a point moves no faster than three times the above, and whose heights
   /// differ by no more than this, are one [m].
   double same_rest = 0.01;
@@ -68,9 +68,10 @@ struct DYNACOM_EXPORT DetectionSettings {
   // Costs.
 
   /// What being in contact is worth, for a second: a point costs as much less.
-  double contact_gain = 10.;
-  /// The greatest cost of heights and speeds in their own scales.
-  double fine_greatest = 14.;
+  double contact_gain = 12.;
+  /// By how much the cost of heights and speeds in their own scales exceeds that at most: who is in
+  /// the air never pays for it by this cost alone.
+  double fine_excess = 4.;
   /// The same in absolute scales, [m] and [m/s], with a factor, and the greatest cost.
   double coarse_factor = 3., coarse_height = 0.05, coarse_speed = 0.45, coarse_greatest = 50.;
   /// How far below its rest a point is pressed, and not sunk [m].
@@ -80,7 +81,7 @@ struct DYNACOM_EXPORT DetectionSettings {
   double missing_greatest = 15., missing_factor = 2., missing_force = 0.1, missing_torque = 0.05;
   /// How much the cost of the dynamics counts.
   double dynamics_weight = 1.2;
-  /// What each further point of a limb counts, where the first counts 1.
+  /// What each further point of a limb counts, where the first counts 1; no more than that.
   double further_points = 0.5;
   /// How many of all these costs make a second [1/s].
   double rate = 30.;
@@ -98,8 +99,9 @@ struct DYNACOM_EXPORT DetectionSettings {
   using Constant = std::pair<const char*, double DetectionSettings::*>;
   static const std::vector<Constant>& constants();
 
-  /// @throws std::invalid_argument naming the first field out of its range: constants are > 0, and
-  ///         none that is called least is greater than its greatest; the ground's velocity is level
+  /// @throws std::invalid_argument naming the first field out of its range: constants are > 0,
+  ///         none that is called least is greater than its greatest, and further_points is no more
+  ///         than 1; the ground's velocity is level
   void validate() const;
   std::string to_string() const;
   bool operator==(const DetectionSettings& other) const;

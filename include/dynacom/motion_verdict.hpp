@@ -13,10 +13,14 @@
 namespace dynacom {
 
 /// What may be wrong with a motion. In each frame something is measured; forces are parts of the
-/// robot's weight m g, moments of m g times a metre. What accelerations decide, the first four, is
-/// not measured in frames whose accelerations are not known (MotionVerdict::unsure), nor is
-/// FootSliding near jumps: these are 0 there.
+/// robot's weight m g, moments of m g times a metre. What accelerations decide, from ResidualForce
+/// to FlightWithSupportNeeded, is not measured in frames whose accelerations are not known
+/// (MotionVerdict::unsure), nor is FootSliding near jumps: these are 0 there.
 enum class MotionFault {
+  /// An active contact's normal, which must point into the robot, points down: how far below the
+  /// horizontal [rad], π/2 for straight down. It comes first, since it is the robot's description
+  /// that is wrong then, and what else was found is worth little.
+  DownwardNormal,
   /// The contacts cannot give the force: ‖force of the residual‖ [m g]. Zero without contacts.
   ResidualForce,
   /// The contacts cannot give the moment: ‖moment of the residual‖ [m g·m]. Zero without contacts.
@@ -38,7 +42,7 @@ enum class MotionFault {
   Discontinuity,
 };
 
-constexpr std::size_t kMotionFaults = 7;
+constexpr std::size_t kMotionFaults = 8;
 
 /// The fault's code, such as "residual_force".
 DYNACOM_EXPORT const char* to_string(MotionFault fault);
@@ -61,6 +65,8 @@ struct FaultLimit {
 /// The limits of all faults, and what else judgeMotion() needs to know. Recorded motions of real
 /// people, fitted to a robot, are never exact: the defaults let pass what a controller can mend.
 struct DYNACOM_EXPORT VerdictSettings {
+  /// Beyond 63 degrees: the soles of robots that kneel on their insteps face up by 50 degrees.
+  FaultLimit downward_normal = {1.1, 0.02};
   FaultLimit residual_force = {0.1, 0.05};
   FaultLimit residual_torque = {0.03, 0.05};
   FaultLimit cop_outside = {0.02, 0.1};
@@ -108,8 +114,9 @@ struct MotionFinding {
   double worst;              ///< the largest measured
   double time;               ///< of the first frame where that is [s]
   bool holds;                ///< whether more frames than allowed are beyond the limit
-  /// Whose that is: a contact's name for GroundPenetration and FootSliding; for Discontinuity
-  /// "root", "root's orientation" or a joint's name. Empty for others, and where nothing is.
+  /// Whose that is: a contact's name for DownwardNormal, GroundPenetration and FootSliding; for
+  /// Discontinuity "root", "root's orientation" or a joint's name. Empty for others, and where
+  /// nothing is.
   std::string subject;
 };
 

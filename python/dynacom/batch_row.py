@@ -36,6 +36,7 @@ from dynacom.motion_report import (
     make_examiner,
     window_times,
 )
+from dynacom.other_contacts import body_statistics, seat_statistics
 from dynacom.robots import Robot
 from dynacom.terrain import ground_heights
 
@@ -71,7 +72,14 @@ _COLUMNS = (
     ("solved_share", "double", ""),
     ("relaxed_share", "double", ""),
     ("no_contact_share", "double", ""),
+    ("bodies", "bodies", ""),
+    ("seats", "seats", ""),
 )
+# Of the columns that hold a list of things: what is known of each.
+_THINGS = {
+    "bodies": ("link", "active_share", "weight_share", "largest_vertical_force"),
+    "seats": ("link", "begin", "end", "height", "weight_share"),
+}
 _FAULT_COLUMNS = (
     ("holds", "bool", ""),
     ("frames", "int64", ""),
@@ -162,6 +170,11 @@ class Job:
         """Of the table: its columns are those of docs/batch.md."""
         import pyarrow
 
+        def things(names: tuple[str, ...]) -> pyarrow.DataType:
+            kinds = {"link": pyarrow.string()}
+            own = [pyarrow.field(name, kinds.get(name, pyarrow.float64())) for name in names]
+            return pyarrow.list_(pyarrow.struct(own))
+
         types = {
             "string": pyarrow.string(),
             "bool": pyarrow.bool_(),
@@ -169,7 +182,7 @@ class Job:
             "double": pyarrow.float64(),
             "list<string>": pyarrow.list_(pyarrow.string()),
             "list<list<double>>": pyarrow.list_(pyarrow.list_(pyarrow.float64())),
-        }
+        } | {column: things(names) for column, names in _THINGS.items()}
         columns = list(_COLUMNS)
         for code, (unit, _) in FAULTS.items():
             columns += [
@@ -353,6 +366,8 @@ def _report_row(report: MotionReport, name: str) -> Row:
         "frame_rate": derived.frame_rate,
         "omega": found.analysis.omega,
         "cutoff": derived.cutoff or None,
+        "bodies": [{"link": link, **own} for link, own in body_statistics(found).items()],
+        "seats": seat_statistics(found),
         "dynacom": __version__,
     }
     for column in _STATISTICS:

@@ -6,12 +6,15 @@ a motion is feasible, and it is not, or nobody knows; 2 for bad input, which one
 explains.
 """
 
+import functools
+import inspect
 import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
@@ -83,127 +86,215 @@ _Clip = Annotated[
     Path,
     typer.Argument(metavar="CLIP", help="Motion: .csv, .npz, .parquet or .pkl, see docs/files.md."),
 ]
-_RobotName = Annotated[
-    str | None, typer.Option("--robot", metavar="NAME|FILE.yaml", help="See 'dynacom robots'.")
-]
-_Urdf = Annotated[
-    Path | None, typer.Option("--urdf", metavar="FILE", help="A robot without a robot file.")
-]
-_Contacts = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--contact",
-        metavar="FRAME:KIND:KEY=VALUE,...",
-        help="With --urdf: a contact, of kind point or 6d, such as "
-        "sole:6d:half_length=0.1,half_width=0.05,mu=0.7,gu=0.05. May be repeated.",
-    ),
-]
-_Payloads = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--payload",
-        metavar="FRAME:MASS[@x,y,z]",
-        help="A load that the robot carries [kg], [m]. May be repeated.",
-    ),
-]
-_Fps = Annotated[
-    float | None, typer.Option(metavar="HZ", help="Frame rate, of files without times.")
-]
-_Quat = Annotated[
-    str | None,
-    typer.Option(metavar="xyzw|wxyz", help="Order of quaternions, where the file does not say."),
-]
-_Trust = Annotated[
-    bool,
-    typer.Option("--trust", help="Read pickles that may run code as they are read."),
-]
-_ClipName = Annotated[
-    str | None,
-    typer.Option("--clip", metavar="NAME", help="Which clip, where a pickle holds several."),
-]
-_Schedule = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE.yaml", help="When contacts are active, such as schedule.yaml."),
-]
-_Cutoff = Annotated[
-    str | None,
-    typer.Option(
-        metavar="HZ|auto",
-        help="Cut-off of the filter where velocities and accelerations are computed; 0 for no "
-        "filter. By itself: none for exact motions, 6 for others, less at low frame rates.",
-    ),
-]
-_Ground = Annotated[
-    float | None,
-    typer.Option(
-        "--ground-height", metavar="H", help="Height of the ground [m]; else it is found."
-    ),
-]
-_GroundVelocity = Annotated[
-    str | None,
-    typer.Option(
-        "--ground-velocity",
-        metavar="X,Y,Z",
-        help="Velocity of the ground, a treadmill's [m/s]; else it is found.",
-    ),
-]
-_Gravity = Annotated[
-    float | None,
-    typer.Option("--gravity", metavar="G", help="Downward [m/s²]; 9.81 by default, 0 for none."),
-]
-_FeetOnly = Annotated[
-    bool,
-    typer.Option(
-        "--feet-only",
-        help="Nothing but the robot's contacts touches the ground: no knees, no hands.",
-    ),
-]
-_Flat = Annotated[
-    bool | None,
-    typer.Option("--flat/--uneven", help="Is the ground flat and horizontal? See the CoP."),
-]
-_Omega = Annotated[
-    float | None,
-    typer.Option(
-        metavar="W",
-        help="Natural frequency of VRP and DCM [rad/s]; 0 for that of the CoM's mean height.",
-    ),
-]
-_SettingsFile = Annotated[
-    Path | None,
-    typer.Option("--settings", metavar="FILE.yaml", help="Settings, see docs/verdict.md."),
-]
-_Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help="A setting, such as verdict.residual_force.limit=0.2. May be repeated.",
-    ),
-]
+
+
+@dataclass(frozen=True)
+class _Request:
+    """The options that all commands have which judge motions."""
+
+    robot: Annotated[
+        str | None, typer.Option("--robot", metavar="NAME|FILE.yaml", help="See 'dynacom robots'.")
+    ] = None
+    urdf: Annotated[
+        Path | None, typer.Option("--urdf", metavar="FILE", help="A robot without a robot file.")
+    ] = None
+    contact: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--contact",
+            metavar="FRAME:KIND:KEY=VALUE,...",
+            help="With --urdf: a contact, of kind point or 6d, such as "
+            "sole:6d:half_length=0.1,half_width=0.05,mu=0.7,gu=0.05. May be repeated.",
+        ),
+    ] = None
+    payload: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--payload",
+            metavar="FRAME:MASS[@x,y,z]",
+            help="A load that the robot carries [kg], [m]. May be repeated.",
+        ),
+    ] = None
+    fps: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Frame rate, of files without times.")
+    ] = None
+    quat: Annotated[
+        str | None,
+        typer.Option(
+            metavar="xyzw|wxyz", help="Order of quaternions, where the file does not say."
+        ),
+    ] = None
+    trust: Annotated[
+        bool,
+        typer.Option("--trust", help="Read pickles that may run code as they are read."),
+    ] = False
+    cutoff: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HZ|auto",
+            help="Cut-off of the filter where velocities and accelerations are computed; 0 for no "
+            "filter. By itself: none for exact motions, 6 for others, less at low frame rates.",
+        ),
+    ] = None
+    ground_height: Annotated[
+        float | None,
+        typer.Option(
+            "--ground-height", metavar="H", help="Height of the ground [m]; else it is found."
+        ),
+    ] = None
+    ground_velocity: Annotated[
+        str | None,
+        typer.Option(
+            "--ground-velocity",
+            metavar="X,Y,Z",
+            help="Velocity of the ground, a treadmill's [m/s]; else it is found.",
+        ),
+    ] = None
+    gravity: Annotated[
+        float | None,
+        typer.Option(
+            "--gravity", metavar="G", help="Downward [m/s²]; 9.81 by default, 0 for none."
+        ),
+    ] = None
+    feet_only: Annotated[
+        bool,
+        typer.Option(
+            "--feet-only",
+            help="Nothing but the robot's contacts touches the ground: no knees, no hands.",
+        ),
+    ] = False
+    flat: Annotated[
+        bool | None,
+        typer.Option("--flat/--uneven", help="Is the ground flat and horizontal? See the CoP."),
+    ] = None
+    omega: Annotated[
+        float | None,
+        typer.Option(
+            metavar="W",
+            help="Natural frequency of VRP and DCM [rad/s]; 0 for that of the CoM's mean height.",
+        ),
+    ] = None
+    settings: Annotated[
+        Path | None,
+        typer.Option("--settings", metavar="FILE.yaml", help="Settings, see docs/verdict.md."),
+    ] = None
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="A setting, such as verdict.residual_force.limit=0.2. May be repeated.",
+        ),
+    ] = None
+
+    def reading(self) -> dict[str, Any]:
+        """How files are to be read."""
+        return {"fps": self.fps, "quat": self.quat, "trust": self.trust}
+
+    def load_robot(self) -> "dynacom.Robot":
+        from dynacom.robots import make_robot, parse_payload
+
+        if (self.robot is None) == (self.urdf is None):
+            raise DynacomError("the robot must be given by --robot, or by --urdf and --contact")
+        if self.urdf is None and self.contact:
+            raise DynacomError("--contact goes with --urdf: a robot file has its own contacts")
+        if self.urdf is None:
+            robot = dynacom.load_robot(self.robot)
+        else:
+            robot = make_robot(self.urdf, self.contact or [])
+        for text in self.payload or []:
+            robot = robot.with_payload(*parse_payload(text))
+        return robot if self.gravity is None else robot.with_gravity(self.gravity)
+
+    def make_options(self) -> "dynacom.AnalysisOptions":
+        options = dynacom.AnalysisOptions()
+        if self.settings is not None:
+            options.update_from_file(self.settings)
+        options.update_from_texts(self.set_ or [])
+        values = {"cutoff": _parse_cutoff(self.cutoff), "flat": self.flat, "omega": self.omega}
+        given = {name: value for name, value in values.items() if value is not None}
+        if self.feet_only:
+            given["feet_only"] = True
+        ground = {}
+        if self.ground_height is not None:
+            ground["ground_height"] = self.ground_height
+        if self.ground_velocity is not None:
+            try:
+                velocity = [float(text) for text in self.ground_velocity.split(",")]
+            except ValueError as error:
+                raise DynacomError(
+                    f"--ground-velocity must be X,Y,Z in m/s, got '{self.ground_velocity}'"
+                ) from error
+            ground["ground_velocity"] = velocity
+        if ground:
+            given["detection"] = ground
+        options.update(given, "options")
+        return options
+
+
+@dataclass(frozen=True)
+class _ClipRequest(_Request):
+    """Those of the commands that judge one motion."""
+
+    clip_name: Annotated[
+        str | None,
+        typer.Option("--clip", metavar="NAME", help="Which clip, where a pickle holds several."),
+    ] = None
+    schedule: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.yaml", help="When contacts are active, such as schedule.yaml."),
+    ] = None
+
+    def analyze(self, clip: Path) -> "dynacom.MotionReport":
+        """Judges the motion, with a progress bar."""
+        robot, options = self.load_robot(), self.make_options()
+        with _progress() as progress:
+            return dynacom.analyze(
+                clip,
+                robot,
+                schedule=self.schedule,
+                options=options,
+                progress=progress,
+                clip=self.clip_name,
+                **self.reading(),
+            )
+
+
+def _with_options(function: Callable[..., None]) -> Callable[..., None]:
+    """A command that has an option for each field of its parameter `request`."""
+    own = get_type_hints(function, include_extras=True)
+    kind = own.pop("request")
+    hints = get_type_hints(kind, include_extras=True)
+    options = [
+        inspect.Parameter(
+            field.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=field.default,
+            annotation=hints[field.name],
+        )
+        for field in fields(kind)
+    ]
+    others = [
+        parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=own[name])
+        for name, parameter in inspect.signature(function).parameters.items()
+        if name != "request"
+    ]
+
+    @functools.wraps(function)
+    def command(**arguments: Any) -> None:
+        given = {option.name: arguments.pop(option.name) for option in options}
+        function(request=kind(**given), **arguments)
+
+    command.__signature__ = inspect.Signature(options + others)
+    command.__annotations__ = {p.name: p.annotation for p in options + others}
+    return command
 
 
 @app.command()
+@_with_options
 def analyze(
+    request: _ClipRequest,
     clip: _Clip,
-    robot: _RobotName = None,
-    urdf: _Urdf = None,
-    contact: _Contacts = None,
-    payload: _Payloads = None,
-    fps: _Fps = None,
-    quat: _Quat = None,
-    trust: _Trust = False,
-    clip_name: _ClipName = None,
-    schedule: _Schedule = None,
-    cutoff: _Cutoff = None,
-    ground_height: _Ground = None,
-    ground_velocity: _GroundVelocity = None,
-    gravity: _Gravity = None,
-    feet_only: _FeetOnly = False,
-    flat: _Flat = None,
-    omega: _Omega = None,
-    settings: _SettingsFile = None,
-    set_: _Set = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -228,18 +319,7 @@ def analyze(
 
     from dynacom.summary import summary_table
 
-    report = _analyze(
-        clip,
-        _load_robot(robot, urdf, contact, payload, gravity),
-        schedule,
-        _make_options(
-            settings, set_, cutoff, ground_height, ground_velocity, feet_only, flat, omega
-        ),
-        fps=fps,
-        quat=quat,
-        trust=trust,
-        clip=clip_name,
-    )
+    report = request.analyze(clip)
     name = Path(clip.name.removesuffix(".gz")).stem
     with Console(stderr=True).status("Writing the results", spinner="line"):
         files = report.save(out or Path(f"{name}-analysis"), csv=csv, page=page)
@@ -252,43 +332,16 @@ def analyze(
 
 
 @app.command()
+@_with_options
 def show(
+    request: _ClipRequest,
     clip: _Clip,
-    robot: _RobotName = None,
-    urdf: _Urdf = None,
-    contact: _Contacts = None,
-    payload: _Payloads = None,
-    fps: _Fps = None,
-    quat: _Quat = None,
-    trust: _Trust = False,
-    clip_name: _ClipName = None,
-    schedule: _Schedule = None,
-    cutoff: _Cutoff = None,
-    ground_height: _Ground = None,
-    ground_velocity: _GroundVelocity = None,
-    gravity: _Gravity = None,
-    feet_only: _FeetOnly = False,
-    flat: _Flat = None,
-    omega: _Omega = None,
-    settings: _SettingsFile = None,
-    set_: _Set = None,
     port: Annotated[int, typer.Option(help="Port of the viewer on this machine.")] = 8080,
 ) -> None:
     """Show a motion in a browser, with what its contacts feel, until Ctrl-C."""
     from dynacom import scene
 
-    report = _analyze(
-        clip,
-        _load_robot(robot, urdf, contact, payload, gravity),
-        schedule,
-        _make_options(
-            settings, set_, cutoff, ground_height, ground_velocity, feet_only, flat, omega
-        ),
-        fps=fps,
-        quat=quat,
-        trust=trust,
-        clip=clip_name,
-    )
+    report = request.analyze(clip)
     scene.show(
         report.robot,
         report.motion.q,
@@ -300,7 +353,9 @@ def show(
 
 
 @app.command()
+@_with_options
 def batch(
+    request: _Request,
     paths: Annotated[
         list[str],
         typer.Argument(
@@ -312,22 +367,6 @@ def batch(
         Path,
         typer.Option(metavar="DIR", help="Folder for the results, made if it is not there."),
     ],
-    robot: _RobotName = None,
-    urdf: _Urdf = None,
-    contact: _Contacts = None,
-    payload: _Payloads = None,
-    fps: _Fps = None,
-    quat: _Quat = None,
-    trust: _Trust = False,
-    cutoff: _Cutoff = None,
-    ground_height: _Ground = None,
-    ground_velocity: _GroundVelocity = None,
-    gravity: _Gravity = None,
-    feet_only: _FeetOnly = False,
-    flat: _Flat = None,
-    omega: _Omega = None,
-    settings: _SettingsFile = None,
-    set_: _Set = None,
     engine: Annotated[
         str, typer.Option(metavar="local|ray", help="Processes of this machine, or Ray Data.")
     ] = "local",
@@ -367,14 +406,10 @@ def batch(
         with _batch_progress() as show:
             found = run_batch(
                 paths,
-                _load_robot(robot, urdf, contact, payload, gravity),
+                request.load_robot(),
                 out,
-                options=_make_options(
-                    settings, set_, cutoff, ground_height, ground_velocity, feet_only, flat, omega
-                ),
-                fps=fps,
-                quat=quat,
-                trust=trust,
+                options=request.make_options(),
+                **request.reading(),
                 engine=engine,
                 jobs=jobs,
                 shard=None if shard is None else _parse_shard(shard),
@@ -401,66 +436,6 @@ def _parse_shard(text: str) -> tuple[int, int]:
     if not (slash and part.isdecimal() and parts.isdecimal()):
         raise DynacomError(f"shard must be i/n with i from 1 to n, got {text}")
     return int(part), int(parts)
-
-
-def _analyze(motion, robot, schedule, options, **reading) -> "dynacom.MotionReport":
-    with _progress() as progress:
-        return dynacom.analyze(
-            motion, robot, schedule=schedule, options=options, progress=progress, **reading
-        )
-
-
-def _load_robot(
-    name: str | None,
-    urdf: Path | None,
-    contacts: list[str] | None,
-    payloads: list[str] | None,
-    gravity: float | None,
-) -> "dynacom.Robot":
-    from dynacom.robots import make_robot, parse_payload
-
-    if (name is None) == (urdf is None):
-        raise DynacomError("the robot must be given by --robot, or by --urdf and --contact")
-    if urdf is None and contacts:
-        raise DynacomError("--contact goes with --urdf: a robot file has its own contacts")
-    robot = dynacom.load_robot(name) if urdf is None else make_robot(urdf, contacts or [])
-    for text in payloads or []:
-        robot = robot.with_payload(*parse_payload(text))
-    return robot if gravity is None else robot.with_gravity(gravity)
-
-
-def _make_options(
-    file: Path | None,
-    texts: list[str] | None,
-    cutoff: str | None,
-    ground_height: float | None,
-    ground_velocity: str | None,
-    feet_only: bool,
-    flat: bool | None,
-    omega: float | None,
-) -> "dynacom.AnalysisOptions":
-    options = dynacom.AnalysisOptions()
-    if file is not None:
-        options.update_from_file(file)
-    options.update_from_texts(texts or [])
-    values = {"cutoff": _parse_cutoff(cutoff), "flat": flat, "omega": omega}
-    given = {name: value for name, value in values.items() if value is not None}
-    if feet_only:
-        given["feet_only"] = True
-    ground = {}
-    if ground_height is not None:
-        ground["ground_height"] = ground_height
-    if ground_velocity is not None:
-        try:
-            ground["ground_velocity"] = [float(text) for text in ground_velocity.split(",")]
-        except ValueError as error:
-            raise DynacomError(
-                f"--ground-velocity must be X,Y,Z in m/s, got '{ground_velocity}'"
-            ) from error
-    if ground:
-        given["detection"] = ground
-    options.update(given, "options")
-    return options
 
 
 def _parse_cutoff(text: str | None) -> float | str | None:

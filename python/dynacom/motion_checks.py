@@ -26,8 +26,8 @@ DEGREES_SHARE, DEGREES_EXCESS, RADIANS_EXCESS = 0.4, 1.0, 0.35
 TURN = 2.0 * np.pi
 #: An angle so far outside its limits is noted [rad]. Retargeted motions go a little beyond.
 NOTED_EXCESS = 0.1
-#: A time step, in median ones.
-HOLE = 3.0
+#: A time step, in median ones: of evenly spaced frames, two may be missing in a row.
+HOLE = 3.5
 
 _ORDERS = {"xyzw": "x y z w", "wxyz": "w x y z"}
 

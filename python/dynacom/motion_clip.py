@@ -10,6 +10,7 @@ import numpy as np
 from dynacom.dynacom_pywrap import ContactPointSettings, ContactSchedule
 from dynacom.errors import DynacomError
 from dynacom.motion_checks import QUATERNION_NOTED, check_angles, normalize
+from dynacom.motion_gaps import Gaps
 from dynacom.motion_joints import brief, configurations, joint_angles
 from dynacom.robots import Robot
 
@@ -94,6 +95,8 @@ def clip_from_configurations(
 ) -> Clip:
     """A clip of configurations, whose numbers are finite, and whose quaternions may need a norm.
 
+    Frames that are missing among evenly spaced ones are made from those around them.
+
     Args:
         names: of the joints that the file gives.
         order: of the file's quaternions; see :func:`normalize`.
@@ -119,7 +122,14 @@ def clip_from_configurations(
             f"{error.max():.1g}."
         )
     given = tuple(name for name in known if name in there)
-    return Clip(path, time, q, v, a, given, schedule, forces or {}, error, tuple(notes))
+    forces = forces or {}
+    if gaps := Gaps.find(time):
+        notes.append(gaps.note())
+        time, q, error = gaps.times(), gaps.configurations(robot.model, q), gaps.repeated(error)
+        v, a = (None if values is None else gaps.interpolated(values) for values in (v, a))
+        schedule = None if schedule is None else gaps.schedule(schedule)
+        forces = gaps.forces(forces)
+    return Clip(path, time, q, v, a, given, schedule, forces, error, tuple(notes))
 
 
 def schedule_from_masks(names: Sequence[str], masks: np.ndarray) -> ContactSchedule:

@@ -3,6 +3,7 @@
 
 import copy
 import json
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,7 +22,6 @@ from dynacom.dynacom_pywrap import (
     MotionAnalysis,
     MotionExamination,
     MotionExaminer,
-    MotionStatistics,
     MotionVerdict,
     RecordedMotion,
     compareMeasured,
@@ -32,8 +32,9 @@ from dynacom.dynacom_pywrap import (
     kThinnedRate,
 )
 from dynacom.errors import DynacomError
+from dynacom.missing_contacts import find_missing, missing_texts, unexplained
 from dynacom.motion_file import Clip, read_motion
-from dynacom.other_contacts import body_statistics, body_texts
+from dynacom.other_contacts import body_statistics, body_texts, seat_statistics
 from dynacom.results_folder import results_folder
 from dynacom.robots import Robot, load_robot
 from dynacom.schedule_file import read_schedule, write_schedule
@@ -105,12 +106,6 @@ _BODY_COLUMNS = (
 )
 # Where the file says what the contacts felt.
 _MEASURED_COLUMNS = (("measured_force", _XYZ, "N"), ("measured_torque", _XYZ, "N m"))
-
-
-# From which mean residual on it may be a load that nobody has told of, [m g] or [m g m], and as a
-# part of the residual's root mean square, since a load does not change its sign: a box that a G1
-# carries for half of a clip comes to 0.005 and a quarter, dances without a load to a twentieth.
-_LOAD, _LOAD_PART = 0.003, 0.2
 
 #: What may be wrong with a motion: code -> unit of its worst value, and what it means.
 FAULTS: dict[str, tuple[str, str]] = describeFaults()
@@ -383,7 +378,8 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
     clip, robot, found = report.clip, report.robot, report.examination
     derived, statistics = found.derived, found.statistics
     derivatives = _derivatives_text(clip, derived)
-    downward = list(_downward_texts(robot, found.verdict))
+    downward = list(_downward_texts(robot, found.verdict, report.options))
+    missing = find_missing(found, report.options)
     notes = [
         *downward,
         *clip.notes,
@@ -391,14 +387,8 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         report._schedule_text,
         *terrain_texts(robot, found),
         *body_texts(robot, report.options, found),
+        *missing_texts(missing, found, report.options, is_reversed=bool(downward)),
     ]
-    solved = statistics.share(DistributionStatus.Solved)
-    residual = statistics.mean_residual.tolist()
-    unexplained = {"share": 1.0 - solved, "force": residual[:3], "torque": residual[3:]}
-    if solved < 1.0:
-        # Forces that would have to pull are no load.
-        is_load = not downward and _is_load(statistics)
-        notes.append(_unexplained_text(unexplained, is_load))
     sensitivity = []
     if derived.cutoff > 0.0:
         sensitivity = [_residuals(entry) for entry in found.sensitivity]
@@ -431,9 +421,11 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
             for contact in statistics.contacts
         },
         "bodies": body_statistics(found),
+        "seats": seat_statistics(found),
         "mean_vertical_force": statistics.mean_vertical_force,
         "momentum_change": statistics.momentum_change,
-        "unexplained": unexplained,
+        "contact_missing": missing,
+        "unexplained": unexplained(statistics),
         "measured": _compare_forces(clip, found.analysis),
         "options": report.options.to_dict(),
     }
@@ -495,36 +487,20 @@ def _cutoff_text(derived: DerivedMotion) -> str:
     return text
 
 
-def _is_load(statistics: MotionStatistics) -> bool:
-    """Whether what is missing may be a load: enough of it, and much the same all the time."""
-    means = np.linalg.norm(statistics.mean_residual.reshape(2, 3), axis=1) / statistics.weight
-    spread = np.array([statistics.residual_force_rms, statistics.residual_torque_rms])
-    return bool((means > np.maximum(_LOAD, _LOAD_PART * spread)).any())
-
-
-def _unexplained_text(unexplained: dict[str, Any], is_load: bool) -> str:
-    force, torque = unexplained["force"], unexplained["torque"]
-    text = (
-        f"In {unexplained['share']:.1%} of the frames the contacts cannot give what the motion "
-        "takes."
-    )
-    if is_load:
-        force, torque = (", ".join(f"{value:.3g}" for value in part) for part in (force, torque))
-        text += (
-            f" Where a contact is active, ({force}) N and ({torque}) N m are missing on average, "
-            "forward, left and up: a load that nobody has told of may be the reason."
-        )
-    return text
-
-
-def _downward_texts(robot: Robot, verdict: MotionVerdict) -> Iterator[str]:
-    """Of contacts whose normal points down in most frames in which they are active."""
+def _downward_texts(
+    robot: Robot, verdict: MotionVerdict, options: AnalysisOptions
+) -> Iterator[str]:
+    """Of the contacts for which the fault ``downward_normal`` speaks."""
+    if not verdict.findings["downward_normal"].holds:
+        return
+    limit = math.sin(min(options.verdict.downward_normal.limit, 0.5 * math.pi))
     for (name, settings), normal in zip(robot.contacts.items(), verdict.normals, strict=True):
-        if normal.downward_share > 0.5:
+        if normal.up < -limit:
             yield (
                 f"{name}'s normal points down (the z axis of the frame {settings.frame_name} has "
                 f"a vertical component of {normal.up:.2f} on average) while it carries: a "
-                "contact's z axis must point into the robot."
+                "contact's z axis must point into the robot, else its force would pull. The robot "
+                "file is to be corrected first."
             )
 
 

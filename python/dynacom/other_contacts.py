@@ -2,6 +2,7 @@
 """What touches the ground besides a robot's contacts: knees, hands, a back."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -13,14 +14,30 @@ from dynacom.robots import Robot
 
 def body_statistics(found: MotionExamination) -> dict[str, dict[str, float]]:
     """Link's name -> what part of the frames it is active in, and its vertical force [m g]."""
-    return {
-        body.link: {
+    statistics = {}
+    for body in found.analysis.bodies:
+        share = body.force[:, 2] / found.statistics.weight
+        statistics[body.link] = {
             "active_share": float(np.mean(body.active)),
-            "weight_share": float(np.mean(body.force[:, 2])) / found.statistics.weight,
-            "largest_vertical_force": float(np.max(body.force[:, 2])) / found.statistics.weight,
+            "weight_share": float(share.mean()),
+            "largest_vertical_force": float(share.max()),
         }
-        for body in found.analysis.bodies
-    }
+    return statistics
+
+
+def seat_statistics(found: MotionExamination) -> list[dict[str, Any]]:
+    """The links that would have to carry where no ground is known: docs/verdict.md."""
+    time = found.analysis.time
+    return [
+        {
+            "link": seat.link,
+            "begin": float(time[seat.first]),
+            "end": float(time[seat.behind - 1]),
+            "height": seat.height,
+            "weight_share": seat.weight_share,
+        }
+        for seat in found.seats
+    ]
 
 
 def body_texts(robot: Robot, options: AnalysisOptions, found: MotionExamination) -> Iterator[str]:
@@ -36,11 +53,10 @@ def body_texts(robot: Robot, options: AnalysisOptions, found: MotionExamination)
             f"{names} {'carry' if first else 'carries'} {share:.0%} of the weight in "
             f"{active.mean():.0%} of the frames; --feet-only leaves such contacts out."
         )
-    time = found.analysis.time
-    for seat in found.seats:
+    for seat in seat_statistics(found):
         yield (
-            f"{seat.link} would have to carry {seat.weight_share:.0%} of the weight at "
-            f"{seat.height:.2f} m from {time[seat.first]:.2f} to {time[seat.behind - 1]:.2f} s, "
+            f"{seat['link']} would have to carry {seat['weight_share']:.0%} of the weight at "
+            f"{seat['height']:.2f} m from {seat['begin']:.2f} to {seat['end']:.2f} s, "
             "where no ground is known: a seat? Its force is not counted."
         )
     if options.feet_only or found.verdict.feasible:

@@ -23,7 +23,7 @@ constexpr std::size_t kMaximalParts = 32;
 constexpr double kStandardGravity = 9.81;
 
 // A contact takes its load on, and gives it back, over so long [s], from and to this readiness.
-constexpr double kRamp = 0.1, kLeastReadiness = 0.2;
+constexpr double kRamp = 0.1, kLeastReadiness = 0.3;
 
 // How readily parts bear load: less where their contact has just begun, or is about to end.
 Eigen::MatrixXd findReadiness(const ContactSchedule::Matrix& active, const Eigen::VectorXd& time) {

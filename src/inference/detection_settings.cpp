@@ -54,7 +54,7 @@ const std::vector<DetectionSettings::Constant>& DetectionSettings::constants() {
       {"force_scale_greatest", &DetectionSettings::force_scale_greatest},
       {"lever", &DetectionSettings::lever},
       {"contact_gain", &DetectionSettings::contact_gain},
-      {"fine_greatest", &DetectionSettings::fine_greatest},
+      {"fine_excess", &DetectionSettings::fine_excess},
       {"coarse_factor", &DetectionSettings::coarse_factor},
       {"coarse_height", &DetectionSettings::coarse_height},
       {"coarse_speed", &DetectionSettings::coarse_speed},
@@ -83,6 +83,8 @@ void DetectionSettings::validate() const {
     internal::requireField(this->*greatest >= this->*least,
                            ("DetectionSettings." + std::string(nameOf(greatest))).c_str(),
                            internal::concat(">= ", nameOf(least)).c_str(), this->*greatest);
+  internal::requireField(further_points <= 1., "DetectionSettings.further_points", "<= 1",
+                         further_points);
   internal::requireField(!std::isinf(ground_height), "DetectionSettings.ground_height",
                          "finite or NaN", ground_height);
   internal::requireField((ground_velocity.allFinite() && ground_velocity.z() == 0.) ||

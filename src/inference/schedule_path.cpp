@@ -21,11 +21,8 @@ using Mask = std::uint32_t;
 constexpr std::size_t kMaximalSets = 256;
 // What costs no more than this is not worth looking for: it is a hundredth of a change of contact.
 constexpr double kNegligible = 0.05;
-// A point whose probability is between this and one minus this is not sure; and sets that cost this
-// much more than the cheapest are not probable.
-constexpr double kSure = 0.02, kImprobable = 7.;
-
-constexpr double kUnknown = -1.;  // what a set is missing, before it was computed
+// Sets are probable from here on; and those that cost this much more than the cheapest are not.
+constexpr double kProbable = 0.005, kImprobable = 6.;
 
 // A change of contact is as probable as its cost says in so long a time [s], and in a shorter frame
 // the less.
@@ -41,29 +38,29 @@ struct Level {
 // active.
 using Levels = std::vector<std::vector<Level>>;
 
-// The sets of a frame: each takes of each limb one of its levels. They are numbered in the manner of
-// digits, the first limb's being the fastest.
+// The sets of a frame: each takes of each limb one of its levels. They are numbered in the manner
+// of digits, the first limb's being the fastest.
 struct FrameSets {
   Levels levels;
+  std::vector<Mask> mask;
   std::vector<float> cost;        // of where the points are
-  std::vector<float> missing;     // cost of the dynamics; kUnknown before it is computed
+  std::vector<float> missing;     // cost of what the set cannot give; before it is known, a bound
+  std::vector<bool> is_known;     // whether it is
   std::vector<float> likelihood;  // of the costs, but for a factor
-  float least_missing = 0.f;      // no set is missing less, as far as is known
 
   std::size_t size() const { return cost.size(); }
 
-  Mask mask(std::size_t number) const {
-    Mask mask = 0;
-    for (const std::vector<Level>& limb : levels) {
-      mask |= limb[number % limb.size()].mask;
-      number /= limb.size();
-    }
-    return mask;
-  }
-
   // At least, where it is not known what the set is missing.
-  float total(std::size_t number) const {
-    return cost[number] + std::max(least_missing, missing[number]);
+  float total(std::size_t number) const { return cost[number] + missing[number]; }
+
+  // Cones are nested: what a set cannot give, none of its subsets can, which are missing no less
+  // than `bound`.
+  void setMissing(std::size_t number, float value, float bound) {
+    missing[number] = value;
+    is_known[number] = true;
+    for (std::size_t other = 0; other < number; ++other)
+      if (!is_known[other] && (mask[other] & ~mask[number]) == 0)
+        missing[other] = std::max(missing[other], bound);
   }
   std::size_t findCheapest() const {
     std::size_t best = 0;
@@ -82,16 +79,26 @@ class Changes {
       costs_[0][points] = float(further * change * double(points));
       costs_[1][points] = float(further * change * double(points - 1) + change);
     }
+    for (const std::size_t whole : {0, 1})
+      for (std::size_t points = 0; points < costs_[0].size(); ++points)
+        probabilities_[whole][points] = std::exp(-costs_[whole][points]);
   }
 
-  float cost(Mask before, Mask after) const {
-    std::size_t points = 0;
-    for (Mask rest = before ^ after; rest != 0; rest &= rest - 1) ++points;
-    return costs_[before == 0 || after == 0 ? 1 : 0][points];
-  }
+  float cost(Mask before, Mask after) const { return find(costs_, before, after); }
+  float least() const { return costs_[0][1]; }
+  // In kChangeTime.
+  float probability(Mask before, Mask after) const { return find(probabilities_, before, after); }
 
  private:
-  std::array<std::array<float, 33>, 2> costs_ = {};
+  using Table = std::array<std::array<float, 33>, 2>;
+
+  static float find(const Table& table, Mask before, Mask after) {
+    std::size_t points = 0;
+    for (Mask rest = before ^ after; rest != 0; rest &= rest - 1) ++points;
+    return table[before == 0 || after == 0 ? 1 : 0][points];
+  }
+
+  Table costs_ = {}, probabilities_ = {};
 };
 
 // The cheapest set of a frame by itself, and how much more others cost at least.
@@ -135,6 +142,7 @@ class PathFinder {
     const Index frames = time_.size();
     found_.sets.resize(static_cast<std::size_t>(frames));
     found_.probability.setZero(Index(points_.size()), frames);
+    found_.missing.resize(2, frames);
     const std::vector<bool> certain = chooseCertain();
     for (Index first = 0; first < frames; ++first) {
       if (certain[static_cast<std::size_t>(first)]) {
@@ -146,11 +154,6 @@ class PathFinder {
       while (behind < frames && !certain[static_cast<std::size_t>(behind)]) ++behind;
       findBetween(first, behind);
       first = behind - 1;
-    }
-    found_.missing.resize(2, frames);
-    for (Index frame = 0; frame < frames; ++frame) {
-      const auto missing = project(frame, found_.sets[static_cast<std::size_t>(frame)]);
-      found_.missing.col(frame) << missing.force, missing.torque;
     }
     return std::move(found_);
   }
@@ -166,8 +169,13 @@ class PathFinder {
   double cost(std::size_t point, Index frame) const;
   void makeLevels(Index frame, Levels& levels);
   void makeSets(Index frame, FrameSets& sets);
-  ConeProjection::Residual project(Index frame, Mask set);
-  float computeMissing(Index frame, Mask set);
+  Eigen::Vector2d project(Index frame, Mask set);
+  float costOf(const Eigen::Vector2d& missing, Index frame) const;
+  float leastCostOf(const Eigen::Vector2d& missing, Index frame) const;
+  void learn(FrameSets& sets, Index frame, std::size_t number) {
+    const Eigen::Vector2d missing = project(frame, sets.mask[number]);
+    sets.setMissing(number, costOf(missing, frame), leastCostOf(missing, frame));
+  }
   float changeOf(Mask before, Mask after) const;
 
   Choice choose(Index frame);
@@ -176,9 +184,8 @@ class PathFinder {
 
   void findBetween(Index first, Index behind);
   bool look(FrameSets& sets, Index frame, std::size_t number);
-  bool lookAtProbable(FrameSets& sets, Index frame);
   std::vector<std::size_t> findCheapestPath(std::size_t count);
-  void findProbability(Index first, Index behind);
+  bool findProbability(Index first, Index behind);
 
   const std::vector<PointTrack>& points_;
   const std::vector<Rests>& rests_;
@@ -215,7 +222,8 @@ double PathFinder::cost(std::size_t index, Index frame) const {
     for (std::size_t k = 0; k < known_->masks.size(); ++k)
       if (known_->masks[k] >> index & 1u) carries = known_->active(Index(k), frame);
   if (!carries) return std::numeric_limits<double>::infinity();
-  if (owner < 0) return settings_.fine_greatest + settings_.coarse_greatest;
+  const double fine_greatest = settings_.contact_gain + settings_.fine_excess;
+  if (owner < 0) return fine_greatest + settings_.coarse_greatest;
   const auto square = [](double value) { return value * value; };
   const double height =
       point.position(2, frame) - rests.list[static_cast<std::size_t>(owner)].height;
@@ -228,7 +236,7 @@ double PathFinder::cost(std::size_t index, Index frame) const {
       square(off / scales_.height) + (square(vertical) + horizontal) / square(scales_.speed);
   const double coarse = square(off / settings_.coarse_height) +
                         (square(vertical) + horizontal) / square(settings_.coarse_speed);
-  return std::min(fine, settings_.fine_greatest) +
+  return std::min(fine, fine_greatest) +
          std::min(settings_.coarse_factor * coarse, settings_.coarse_greatest);
 }
 
@@ -288,36 +296,47 @@ void PathFinder::makeLevels(Index frame, Levels& levels) {
 void PathFinder::makeSets(Index frame, FrameSets& sets) {
   makeLevels(frame, sets.levels);
   sets.cost.assign(1, 0.f);
+  sets.mask.assign(1, 0);
   for (const std::vector<Level>& limb : sets.levels) {
-    const std::size_t below = sets.cost.size();
+    const std::size_t below = sets.size();
     sets.cost.resize(below * limb.size());
+    sets.mask.resize(sets.size());
     for (std::size_t level = limb.size(); level-- > 0;)
-      for (std::size_t low = 0; low < below; ++low)
+      for (std::size_t low = 0; low < below; ++low) {
         sets.cost[level * below + low] = sets.cost[low] + limb[level].cost;
+        sets.mask[level * below + low] = sets.mask[low] | limb[level].mask;
+      }
   }
-  sets.missing.assign(sets.size(), float(kUnknown));
-  sets.least_missing = 0.f;
+  sets.missing.assign(sets.size(), 0.f);
+  sets.is_known.assign(sets.size(), false);
 }
 
-// What a set cannot give in a frame, in [m g] and [m g m].
-ConeProjection::Residual PathFinder::project(Index frame, Mask set) {
+// What a set cannot give in a frame: norms of force [m g] and moment [m g m].
+Eigen::Vector2d PathFinder::project(Index frame, Mask set) {
   if (placed_ != frame)
     for (std::size_t k = 0; k < points_.size(); ++k)
       levers_.col(Index(k)) = points_[k].position.col(frame) - wrench_.com.col(frame);
   placed_ = frame;
   ConeProjection::Vector6 wrench;
   wrench << wrench_.force.col(frame), wrench_.torque.col(frame);
-  return projection_.project(wrench / weight_, levers_, mu_, set);
+  const auto residual = projection_.project(wrench / weight_, levers_, mu_, set);
+  return {residual.force, residual.torque};
 }
 
-// What that costs.
-float PathFinder::computeMissing(Index frame, Mask set) {
-  const auto missing = project(frame, set);
-  const double fine = missing.force / scales_.force + missing.torque / scales_.torque;
+float PathFinder::costOf(const Eigen::Vector2d& missing, Index frame) const {
+  const double fine = missing[0] / scales_.force + missing[1] / scales_.torque;
   const double coarse =
-      missing.force / settings_.missing_force + missing.torque / settings_.missing_torque;
+      missing[0] / settings_.missing_force + missing[1] / settings_.missing_torque;
   return float(settings_.rate * duration(frame) * settings_.dynamics_weight *
                (std::min(fine, settings_.missing_greatest) + settings_.missing_factor * coarse));
+}
+
+// The least cost of what a subset is missing, whose norm, of force and moment together, is no less.
+float PathFinder::leastCostOf(const Eigen::Vector2d& missing, Index frame) const {
+  const double norm = std::hypot(missing[0], missing[1] / settings_.lever);
+  const bool is_force_cheaper =
+      settings_.missing_force * settings_.lever > settings_.missing_torque;
+  return is_force_cheaper ? costOf({norm, 0.}, frame) : costOf({0., settings_.lever * norm}, frame);
 }
 
 float PathFinder::changeOf(Mask before, Mask after) const {
@@ -341,8 +360,9 @@ Choice PathFinder::choose(Index frame) {
     choice.set |= cheapest(limb)->mask;
     all |= limb.back().mask;
   }
-  float excess = computeMissing(frame, choice.set);
-  if (excess > kNegligible && all != choice.set) excess -= computeMissing(frame, all);
+  found_.missing.col(frame) = project(frame, choice.set);
+  float excess = costOf(found_.missing.col(frame), frame);
+  if (excess > kNegligible && all != choice.set) excess -= leastCostOf(project(frame, all), frame);
   if (all == choice.set || excess <= kNegligible) excess = 0.f;
   choice.ratio = choice.gap;
   for (const std::vector<Level>& limb : levels) {
@@ -360,21 +380,20 @@ Choice PathFinder::choose(Index frame) {
 Choice PathFinder::chooseAmongAll(Index frame) {
   FrameSets& sets = one_;
   makeSets(frame, sets);
-  const std::size_t all = sets.size() - 1;
-  sets.missing[all] = computeMissing(frame, sets.mask(all));
-  sets.least_missing = sets.missing[all];
+  learn(sets, frame, sets.size() - 1);
   std::size_t best = sets.findCheapest();
-  while (sets.missing[best] < 0.f) {
-    sets.missing[best] = computeMissing(frame, sets.mask(best));
+  while (!sets.is_known[best]) {
+    learn(sets, frame, best);
     best = sets.findCheapest();
   }
-  Choice choice = {sets.mask(best), std::numeric_limits<float>::infinity(), 0.f};
+  found_.missing.col(frame) = project(frame, sets.mask[best]);
+  Choice choice = {sets.mask[best], std::numeric_limits<float>::infinity(), 0.f};
   choice.ratio = choice.gap;
   for (std::size_t other = 0; other < sets.size(); ++other) {
     if (other == best) continue;
     const float gap = sets.total(other) - sets.total(best);
     choice.gap = std::min(choice.gap, gap);
-    choice.ratio = std::min(choice.ratio, gap / changeOf(choice.set, sets.mask(other)));
+    choice.ratio = std::min(choice.ratio, gap / changeOf(choice.set, sets.mask[other]));
   }
   return choice;
 }
@@ -386,7 +405,7 @@ Choice PathFinder::chooseAmongAll(Index frame) {
 // the first frame and to leave it at the last. A path that is in other sets all the time saves two
 // times the change from the closest of them to Y at most. So if the sum over the frames of how much
 // more others cost, by the cost of that change, is 2 and more, all cheapest paths are in Y. Certain
-// is what in addition is far from both ends: there other sets are not probable.
+// is where in addition other sets are not probable: far from both ends, and not worth a detour.
 std::vector<bool> PathFinder::chooseCertain() {
   const auto frames = static_cast<std::size_t>(time_.size());
   std::vector<bool> certain(frames, false);
@@ -403,8 +422,12 @@ std::vector<bool> PathFinder::chooseCertain() {
       ratio += ratios[behind];
     if (!(ratio >= 2.f)) continue;
     float since = 0.f, until = 0.f;
-    for (std::size_t frame = first; frame < behind; ++frame)
-      certain[frame] = (since += gaps[frame]) >= kImprobable;
+    for (std::size_t frame = first; frame < behind; ++frame) {
+      const double part = duration(Index(frame)) / kChangeTime;
+      const double there_and_back = 2. * (changes_.least() - std::log(part));
+      certain[frame] = (since += gaps[frame]) >= kImprobable &&
+                       double(gaps[frame]) + there_and_back >= kImprobable;
+    }
     for (std::size_t frame = behind; frame-- > first && until < kImprobable;)
       if ((until += gaps[frame]) < kImprobable) certain[frame] = false;
   }
@@ -426,9 +449,10 @@ void PathFinder::findBetween(Index first, Index behind) {
     for (std::size_t limb = 0; limb < limbs_.size(); ++limb)
       sets.levels[limb].assign(
           1, {found_.sets[static_cast<std::size_t>(frame)] & limb_masks_[limb], 0.f});
+    sets.mask.assign(1, found_.sets[static_cast<std::size_t>(frame)]);
     sets.cost.assign(1, 0.f);
     sets.missing.assign(1, 0.f);
-    sets.least_missing = 0.f;
+    sets.is_known.assign(1, true);
   }
 
   const auto forEach = [&](const auto& act) {
@@ -444,53 +468,26 @@ void PathFinder::findBetween(Index first, Index behind) {
     });
   }
   forEach([&](FrameSets& sets, Index frame) {
-    found_.sets[static_cast<std::size_t>(frame)] =
-        sets.mask(path[static_cast<std::size_t>(frame - from)]);
+    const Mask set = sets.mask[path[static_cast<std::size_t>(frame - from)]];
+    found_.sets[static_cast<std::size_t>(frame)] = set;
+    found_.missing.col(frame) = project(frame, set);
   });
 
-  findProbability(from, to);
-  bool changed = false;
-  forEach([&](FrameSets& sets, Index frame) {
-    const auto probability = found_.probability.col(frame).array();
-    if ((probability > kSure && probability < 1. - kSure).any())
-      changed = lookAtProbable(sets, frame) || changed;
-  });
-  if (changed) findProbability(from, to);
+  while (findProbability(from, to)) continue;
 }
 
-// Computes what a set is missing, and if that is something, what those are that may be better, even
-// if the path had to leave this one for them and come back; says whether that was new.
+// Computes what a set is missing, and if that is something, what those are that may be better; says
+// whether that was new.
 bool PathFinder::look(FrameSets& sets, Index frame, std::size_t number) {
-  const auto compute = [&](std::size_t set) {
-    sets.missing[set] = computeMissing(frame, sets.mask(set));
-  };
-  if (sets.missing[number] >= 0.f) return false;
-  compute(number);
+  if (sets.is_known[number]) return false;
+  learn(sets, frame, number);
   if (sets.missing[number] <= kNegligible) return true;
-  // Cones are nested: what all points together cannot give, no set can.
-  const std::size_t all = sets.size() - 1;
-  if (sets.missing[all] < 0.f) compute(all);
-  sets.least_missing = sets.missing[all];
-  if (sets.missing[number] - sets.least_missing <= kNegligible) return true;
-  const Mask own = sets.mask(number);
-  for (std::size_t other = 0; other < sets.size(); ++other) {
-    if (sets.missing[other] >= 0.f) continue;
-    const float way = 2.f * changeOf(own, sets.mask(other));
-    if (sets.total(other) <= sets.total(number) + way) compute(other);
+  if (!sets.is_known.back()) learn(sets, frame, sets.size() - 1);
+  for (std::size_t other = sets.size(); other-- > 0;) {
+    if (sets.is_known[other]) continue;
+    if (sets.total(other) < sets.total(number)) learn(sets, frame, other);
   }
   return true;
-}
-
-// Computes what sets are missing that may be probable; says whether there was any.
-bool PathFinder::lookAtProbable(FrameSets& sets, Index frame) {
-  bool changed = false;
-  const float least = sets.total(sets.findCheapest());
-  for (std::size_t number = 0; number < sets.size(); ++number)
-    if (sets.missing[number] < 0.f && sets.total(number) <= least + kImprobable) {
-      sets.missing[number] = computeMissing(frame, sets.mask(number));
-      changed = true;
-    }
-  return changed;
 }
 
 // Viterbi's recursion over the first of between_. From one frame's sets to the next's limb by limb,
@@ -545,8 +542,9 @@ std::vector<std::size_t> PathFinder::findCheapestPath(std::size_t count) {
 }
 
 // The forward-backward recursion over the same costs, taken for negative logarithms of
-// probabilities; of the frames in between_, the first of which is given.
-void PathFinder::findProbability(Index first, Index behind) {
+// probabilities; of the frames in between_, the first of which is given. Computes what sets are
+// missing that are probable; says whether there was any.
+bool PathFinder::findProbability(Index first, Index behind) {
   const auto count = static_cast<std::size_t>(behind - first);
   if (forward_.size() < count) forward_.resize(count);
   for (std::size_t k = 0; k < count; ++k) {
@@ -579,7 +577,7 @@ void PathFinder::findProbability(Index first, Index behind) {
         for (std::size_t i = 0; i < from.size(); ++i) {
           const float factor = from[i].mask == to[j].mask
                                    ? 1.f
-                                   : part * std::exp(-changes_.cost(from[i].mask, to[j].mask));
+                                   : part * changes_.probability(from[i].mask, to[j].mask);
           for (std::size_t high = 0; high < above; ++high) {
             const std::size_t source = (high * from.size() + i) * below;
             const std::size_t target = (high * to.size() + j) * below;
@@ -601,26 +599,35 @@ void PathFinder::findProbability(Index first, Index behind) {
     }
     weigh(value, between_[k]);
   }
+  bool is_new = false;
   std::vector<float> backward;
   for (std::size_t k = count; k-- > 0;) {
-    const FrameSets& sets = between_[k];
+    FrameSets& sets = between_[k];
     if (k + 1 == count) {
       backward.assign(sets.size(), 1.f);
     } else {
       weigh(backward, between_[k + 1]);
       move(backward, k + 1, k);
     }
-    double sum = 0.;
-    auto probability = found_.probability.col(first + Index(k));
+    float sum = 0.f;
+    for (std::size_t number = 0; number < sets.size(); ++number)
+      sum += forward_[k][number] * backward[number];
+    if (!(sum > 0.f)) continue;
+    const Index frame = first + Index(k);
+    auto probability = found_.probability.col(frame);
     probability.setZero();
     for (std::size_t number = 0; number < sets.size(); ++number) {
-      const double value = double(forward_[k][number]) * double(backward[number]);
-      sum += value;
-      for (Mask rest = sets.mask(number); rest != 0; rest &= rest - 1)
-        probability[__builtin_ctz(rest)] += value;
+      const float value = forward_[k][number] * backward[number] / sum;
+      for (Mask rest = sets.mask[number]; rest != 0; rest &= rest - 1)
+        probability[__builtin_ctz(rest)] += double(value);
+      if (value > kProbable && !sets.is_known[number]) {
+        learn(sets, frame, number);
+        is_new = true;
+      }
     }
-    if (sum > 0.) probability = (probability / sum).cwiseMin(1.);
+    probability = probability.cwiseMin(1.);
   }
+  return is_new;
 }
 
 }  // namespace

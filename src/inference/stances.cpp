@@ -13,9 +13,11 @@ namespace {
 
 using Eigen::Index;
 
-// What of a motion's frames scales are taken from: those this close to one in which a point moves,
-// so that it does not matter for how long the robot stands before and after [s].
+// It does not matter for how long a robot stands before and after a motion, or in between. What
+// counts of its frames are those this close to one in which a point moves [s], in which some point
+// stirs [m/s].
 constexpr double kNearMovement = 0.5;
+constexpr double kStir = 0.01;
 // A normal distribution's standard deviation, in medians of absolute deviations.
 constexpr double kDeviation = 1.4826;
 // How fast a point gets, as a quantile of its speeds.
@@ -35,16 +37,48 @@ Eigen::VectorXd findSpeeds(const PointTrack& point, double horizontal_part) {
       .sqrt();
 }
 
-Rest makeRest(const PointTrack& point, Index first, Index behind) {
-  std::vector<double> heights(static_cast<std::size_t>(behind - first));
-  for (Index frame = first; frame < behind; ++frame)
-    heights[static_cast<std::size_t>(frame - first)] = point.position(2, frame);
+using Frames = Eigen::Array<bool, Eigen::Dynamic, 1>;
+
+Frames findCounting(const std::vector<PointTrack>& points, const Eigen::VectorXd& time,
+                    double moving_speed) {
+  const Index frames = time.size();
+  Frames moves = Frames::Constant(frames, false), stirs = moves;
+  for (const PointTrack& point : points) {
+    const auto speed = point.velocity.colwise().norm().transpose().array();
+    moves = moves || speed > moving_speed;
+    stirs = stirs || speed > kStir;
+  }
+  if (!stirs.any()) return Frames::Constant(frames, true);
+  if (!moves.any()) return stirs;
+  Frames counts = Frames::Constant(frames, false);
+  double last = -std::numeric_limits<double>::infinity();
+  for (Index frame = 0; frame < frames; ++frame) {
+    if (moves[frame]) last = time[frame];
+    if (time[frame] - last <= kNearMovement) counts[frame] = stirs[frame];
+  }
+  last = std::numeric_limits<double>::infinity();
+  for (Index frame = frames; frame-- > 0;) {
+    if (moves[frame]) last = time[frame];
+    if (last - time[frame] <= kNearMovement) counts[frame] = stirs[frame];
+  }
+  return counts;
+}
+
+// Its height is that of the frames that count, if there are any.
+Rest makeRest(const PointTrack& point, const Frames& counts, Index first, Index behind) {
+  std::vector<double> heights;
+  for (const bool all : {false, true}) {
+    for (Index frame = first; frame < behind; ++frame)
+      if (all || counts[frame]) heights.push_back(point.position(2, frame));
+    if (!heights.empty()) break;
+  }
   return {first, behind, quantile(heights, 0.5), false};
 }
 
 // Where a point is slow for long enough.
-std::vector<Rest> findRuns(const PointTrack& point, const Eigen::VectorXd& speed,
-                           const Eigen::VectorXd& time, double slow, double duration) {
+std::vector<Rest> findRuns(const PointTrack& point, const Frames& counts,
+                           const Eigen::VectorXd& speed, const Eigen::VectorXd& time, double slow,
+                           double duration) {
   std::vector<Rest> rests;
   const Index frames = time.size();
   for (Index first = 0, behind = 0; first < frames; first = behind + 1) {
@@ -52,15 +86,16 @@ std::vector<Rest> findRuns(const PointTrack& point, const Eigen::VectorXd& speed
     while (behind < frames && speed[behind] < slow) ++behind;
     if (behind == first) continue;
     const double step = frames > 1 ? (time[frames - 1] - time[0]) / double(frames - 1) : 0.;
-    if (time[behind - 1] - time[first] + step >= duration || behind - first == frames)
-      rests.push_back(makeRest(point, first, behind));
+    // By a little less, because times are rounded.
+    if (time[behind - 1] - time[first] + 1.01 * step >= duration || behind - first == frames)
+      rests.push_back(makeRest(point, counts, first, behind));
   }
   return rests;
 }
 
 // Makes one of neighbours that are the same rest.
-void mergeRests(const PointTrack& point, const Eigen::VectorXd& speed, double slow, double same,
-                std::vector<Rest>& rests) {
+void mergeRests(const PointTrack& point, const Frames& counts, const Eigen::VectorXd& speed,
+                double slow, double same, std::vector<Rest>& rests) {
   std::vector<Rest> merged;
   for (const Rest& rest : rests) {
     if (!merged.empty()) {
@@ -68,7 +103,7 @@ void mergeRests(const PointTrack& point, const Eigen::VectorXd& speed, double sl
       const Index between = rest.first - last.behind;
       const double fastest = between > 0 ? speed.segment(last.behind, between).maxCoeff() : 0.;
       if (fastest < 3. * slow && std::abs(rest.height - last.height) <= same) {
-        last = makeRest(point, last.first, rest.behind);
+        last = makeRest(point, counts, last.first, rest.behind);
         continue;
       }
     }
@@ -169,6 +204,7 @@ Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
 
 std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen::VectorXd& time,
                              bool exact, const DetectionSettings& settings) {
+  const Frames counts = findCounting(points, time, settings.moving_speed);
   std::vector<Rests> all(points.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
     const PointTrack& point = points[k];
@@ -182,8 +218,8 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
                    exact ? settings.exact_rest_speed_least : settings.rest_speed_least,
                    exact ? settings.exact_rest_speed_greatest : settings.rest_speed_greatest);
     std::vector<Rest>& rests = all[k].list;
-    rests = findRuns(point, speed, time, slow, settings.rest_duration);
-    mergeRests(point, speed, slow, settings.same_rest, rests);
+    rests = findRuns(point, counts, speed, time, slow, settings.rest_duration);
+    mergeRests(point, counts, speed, slow, settings.same_rest, rests);
     all[k].owner = findOwners(rests, speed);
   }
 
@@ -226,24 +262,7 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
 
 CostScales findScales(const std::vector<PointTrack>& points, const std::vector<Rests>& rests,
                       const Eigen::VectorXd& time, const DetectionSettings& settings) {
-  const Index frames = time.size();
-  Eigen::Array<bool, Eigen::Dynamic, 1> moves =
-      Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, false);
-  for (const PointTrack& point : points)
-    moves = moves || point.velocity.colwise().norm().transpose().array() > settings.moving_speed;
-  Eigen::Array<bool, Eigen::Dynamic, 1> counts =
-      Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(frames, !moves.any());
-  double last = -std::numeric_limits<double>::infinity();
-  for (Index frame = 0; frame < frames; ++frame) {
-    if (moves[frame]) last = time[frame];
-    if (time[frame] - last <= kNearMovement) counts[frame] = true;
-  }
-  last = std::numeric_limits<double>::infinity();
-  for (Index frame = frames; frame-- > 0;) {
-    if (moves[frame]) last = time[frame];
-    if (last - time[frame] <= kNearMovement) counts[frame] = true;
-  }
-
+  const Frames counts = findCounting(points, time, settings.moving_speed);
   // Links tell only where no contact does: they roll.
   const auto tells = [&](std::size_t k, bool is_body) {
     const auto& list = rests[k].list;

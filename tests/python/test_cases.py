@@ -93,6 +93,9 @@ def test_a_jump(cases):
     assert len(changes(flight)) == 2
     weight = report.summary["mass"] * 9.81
     assert np.abs(report["ground_force"][flight]).max() < 0.05 * weight
+    # Neither rounding in the air nor two frames are worth a word.
+    assert report.summary["contact_missing"] is None
+    assert not note(report, "cannot give")
 
 
 def test_a_slope(cases):
@@ -138,12 +141,30 @@ def test_a_squat_that_is_cut_in_motion(cases):
     assert error.max() < 0.1 * np.abs(expected).max()
 
 
+def test_a_dropped_frame(cases):
+    """One of 1800 is missing: it is made anew, and said so."""
+    path = cases / "drop_t.npz"
+    with np.load(path) as file:
+        time, q, truth = file["t"], file["q"], file["truth"]
+    report = judge(path)
+    assert verdict(report) == ("feasible", ["feasible"])
+    assert report.summary["frames"] == len(time) + 1
+    assert report.summary["frame_rate"] == pytest.approx(100.0)
+    assert note(report, "The frame after 5.99 s is missing: it was made from those around it")
+    there = np.isin(np.rint(100.0 * report.clip.time), np.rint(100.0 * time))
+    assert_allclose(report.clip.q[there], q, rtol=0, atol=1e-12)
+    for name, expected in zip(report.robot.contacts, truth.T, strict=True):
+        found = changes(active(report, name)[there])
+        assert_allclose(found, changes(expected), rtol=0, atol=2, err_msg=name)
+
+
 def test_a_normal_that_points_down_is_said_first(cases):
     contacts = [
         f"{name}:6d:half_length=0.1,half_width=0.05,mu=0.7,gu=0.05" for name in ("l_sole", "r_sole")
     ]
     robot = dynacom.make_robot(cases / "zdown.urdf", contacts)
     report = judge(cases / "full.csv", robot)
+    assert verdict(report) == ("not feasible", ["downward_normal"])
     for name, text in zip(("l_sole", "r_sole"), report.summary["notes"], strict=False):
         assert text.startswith(f"{name}'s normal points down")
         assert "must point into the robot" in text

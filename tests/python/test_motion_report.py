@@ -27,6 +27,7 @@ from dynacom import (
     MotionReport,
     analyze,
     load_robot,
+    missing_contacts,
     motion_report,
     read_motion,
 )
@@ -63,8 +64,10 @@ SUMMARY = [
     "ground_velocity",
     "contacts",
     "bodies",
+    "seats",
     "mean_vertical_force",
     "momentum_change",
+    "contact_missing",
     "unexplained",
     "measured",
     "options",
@@ -378,7 +381,7 @@ def test_unexplained_loads_go_with_the_robot(talos, walk):
     for part in ("force", "torque"):
         assert_allclose(turned.summary["unexplained"][part], lost[part], rtol=0, atol=1e-6)
     note = report.summary["notes"][-1]
-    assert f"In {lost['share']:.1%} of the frames the contacts cannot give" in note
+    assert "a load that nobody has told of" in note
     for value in lost["force"] + lost["torque"]:
         assert f"{value:.3g}" in note
 
@@ -386,6 +389,92 @@ def test_unexplained_loads_go_with_the_robot(talos, walk):
 def test_nothing_unexplained_is_not_mentioned(report):
     assert report.summary["unexplained"]["share"] == 0.0
     assert not any("cannot give" in note for note in report.summary["notes"])
+
+
+def missing_note(report: MotionReport) -> str:
+    (text,) = [note for note in report.summary["notes"] if "cannot give" in note]
+    return text
+
+
+def test_missing_contacts_are_a_note(talos, walk):
+    """Of the walk, the right foot is left out: it is missing while the left one is in the air."""
+    masks = np.asarray(walk.schedule.active).copy()
+    right = list(walk.schedule.names).index("right_sole")
+    alone = masks[:, right] & ~masks[:, 1 - right]
+    masks[:, right] = False
+    report = analyze(walk, talos, schedule=ContactSchedule(walk.schedule.names, masks))
+    missing = report.summary["contact_missing"]
+    time = report["time"]
+    found = np.zeros(len(time), dtype=bool)
+    for begin, end in missing["times"]:
+        found |= (time >= begin) & (time <= end)
+    assert (missing["frames"], missing["share"]) == (found.sum(), found.mean())
+    assert found[alone].mean() > 0.98  # but for the end of a smeared flight
+    residual = np.linalg.norm(report["residual"].reshape(-1, 2, 3), axis=2)
+    residual[np.asarray(report.verdict.unsure)] = 0.0
+    largest = residual[found].max(axis=0) / (9.81 * report.summary["mass"])
+    assert_allclose([missing["force"], missing["torque"]], largest, rtol=1e-9)
+    assert missing["force"] > 0.9  # all of the weight
+    text = missing_note(report)
+    assert f"in {found.sum()} of 318 frames, from {missing['times'][0][0]:.2f} to" in text
+    assert f"up to {missing['force']:.2g} m g of force" in text
+    assert "Either the given contacts are wrong there; or" in text
+
+
+def test_what_is_missing_for_a_moment_is_not_worth_a_note(talos, walk):
+    """A tenth of a second is: what is shorter interrupts no window, either."""
+    step = walk.time[1] - walk.time[0]
+    for frames, is_noted in ((int(0.09 / step), False), (int(0.13 / step), True)):
+        masks = np.asarray(walk.schedule.active).copy()
+        masks[100 : 100 + frames] = False
+        report = analyze(walk, talos, schedule=ContactSchedule(walk.schedule.names, masks))
+        missing = report.summary["contact_missing"]
+        if is_noted:
+            assert_allclose(missing["times"], [report["time"][[100, 99 + frames]]])
+            assert "from" in missing_note(report)
+        else:
+            assert missing is None
+            assert not any("cannot give" in note for note in report.summary["notes"])
+
+
+@pytest.mark.parametrize(
+    ("beyond", "expected"),
+    [
+        ("........", []),
+        (".##.....", []),
+        (".###....", [(1, 3)]),
+        ("......##", []),
+        (".....###", [(5, 7)]),
+        ("#.#.....", [(0, 2)]),
+        ("##..##..", [(0, 5)]),
+        ("##...##.", []),
+        ("###...###", [(0, 2), (6, 8)]),
+        ("#", []),
+    ],
+)
+def test_intervals_of_what_is_missing(beyond, expected):
+    """Of three frames and more, but for interruptions by two and less."""
+    marks = np.array([mark == "#" for mark in beyond], dtype=bool)
+    assert missing_contacts._intervals(marks, 0.1 * np.arange(len(marks)), 0.3) == expected
+
+
+def test_nothing_is_missing_of_what_is_unknown(talos, walk):
+    schedule = ContactSchedule(["left_sole"], np.zeros((318, 1), dtype=bool))
+    report = analyze(walk, talos, schedule=schedule)
+    assert report.summary["contact_missing"]["share"] == 1.0
+    short = replace(
+        walk,
+        time=walk.time[:4],
+        q=walk.q[:4],
+        v=None,
+        a=None,
+        schedule=None,
+        forces={},
+        quaternion_error=walk.quaternion_error[:4],
+    )
+    report = analyze(short, talos)
+    assert report.summary["verdict"] == "unknown"
+    assert report.summary["contact_missing"] is None
 
 
 # Forces from the file.
@@ -997,6 +1086,17 @@ def test_a_normal_that_points_down_is_said_first(shared_data, tmp_path):
         assert note.startswith(f"{side}_sole's normal points down (the z axis of the frame")
         assert "component of -1.00" in note
     assert not any("load" in note for note in notes)
+    assert report.summary["verdict"] == "not feasible"
+    assert report.summary["codes"] == ["downward_normal"]
+    assert report.summary["windows"] == []
+    assert reason(report, "downward_normal")["subject"] == "l_sole"
+    assert (report["fault"] == "downward_normal").all()
+    report.save(tmp_path)
+    assert "downward_normal" in (tmp_path / "report.html").read_text()
+    (row,) = dynacom.batch(cases / "full.csv", robot).to_pylist()
+    assert (row["verdict"], row["codes"]) == ("not feasible", ["downward_normal"])
+    assert (row["downward_normal.frames"], row["feasible_share"]) == (101, 0.0)
+    assert row["downward_normal.worst"] == pytest.approx(np.pi / 2)
 
 
 def test_leaning_beyond_the_toes(shared_data, talos):
@@ -1005,6 +1105,10 @@ def test_leaning_beyond_the_toes(shared_data, talos):
     assert report.summary["codes"] == ["cop_outside"]
     assert reason(report, "cop_outside")["worst"] == pytest.approx(0.05, abs=0.002)
     assert report.summary["windows"] == []
+    missing = report.summary["contact_missing"]
+    assert (missing["frames"], missing["share"]) == (101, 1.0)
+    assert missing["times"] == [[0.0, 1.0]]
+    assert missing["distance"] == pytest.approx(0.05, abs=0.002)
 
 
 # The samples.
@@ -1108,7 +1212,8 @@ def test_a_box_is_not_hidden(samples):
     lost = report.summary["unexplained"]
     assert lost["share"] > 0.3
     assert np.linalg.norm(lost["torque"]) > 1.0
-    assert any("cannot give" in note and "load" in note for note in report.summary["notes"])
+    assert any("cannot give" in note for note in report.summary["notes"])
+    assert any("load" in note for note in report.summary["notes"])
     holding = [entry for entry in report.summary["reasons"] if entry["holds"]]
     assert {entry["code"] for entry in holding} == set(report.summary["codes"])
 

@@ -29,6 +29,7 @@ from helpers import WALKS, documentation, point, sole
 
 # Those of the reasons in summary.json; `feasible` is where none of them holds.
 CODES = [
+    "downward_normal",
     "residual_force",
     "residual_torque",
     "cop_outside",
@@ -38,6 +39,7 @@ CODES = [
     "discontinuity",
 ]
 DEFAULTS = {
+    "downward_normal": (1.1, 0.02),
     "residual_force": (0.1, 0.05),
     "residual_torque": (0.03, 0.05),
     "cop_outside": (0.02, 0.1),
@@ -302,6 +304,29 @@ def test_sliding(stand):
     stand.active[:] = False
     stand.a[:, 2] = -G
     assert stand.judge().feasible
+
+
+def test_normals_that_point_down(stand):
+    """Measured by how far below the horizontal, where the contact is active; and said first."""
+    angles = np.linspace(0.0, np.pi, FRAMES)  # of the body about x
+    stand.q[:, 3], stand.q[:, 6] = np.sin(angles / 2.0), np.cos(angles / 2.0)
+    stand.recorded = stand.q.copy()
+    stand.active[:, 0] = False
+    stand.active[90:, 1] = False
+    verdict = stand.judge()
+    assert verdict.codes[0] == "downward_normal"
+    finding = verdict.findings["downward_normal"]
+    expected = np.clip(angles - np.pi / 2.0, 0.0, None)
+    expected[90:] = 0.0
+    assert_allclose(finding.measured, expected, rtol=0, atol=1e-9)
+    assert finding.frames == np.count_nonzero(expected > 1.1) > 2
+    assert (finding.worst, finding.time) == (pytest.approx(expected[89]), 0.89)
+    assert finding.subject == "right"
+    assert finding.holds
+    # A sole that is tilted farther than a robot that kneels tilts its insteps is none.
+    stand.settings.downward_normal = FaultLimit(1.1, 0.5)
+    assert "downward_normal" not in stand.judge().codes
+    assert stand.judge().findings["downward_normal"].frames == finding.frames
 
 
 def test_jumps_of_the_record(stand):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import linprog
 
 import dynacom
 from dynacom.analysis_options import AnalysisOptions
@@ -168,6 +169,12 @@ def _push_up(robot):
     return np.array(frames)
 
 
+def _sit(robot):
+    """On the edge of a box, two seconds: thighs level, the CoM far behind the feet."""
+    q = _configuration(robot, -THIGH, ANKLE_HEIGHT + SHANK, 0.0, -np.pi / 2, 0.0, 0.0, 2.5, 2.5)
+    return np.tile(q, (200, 1))
+
+
 def _lie(robot):
     """On the back, for two seconds: on the corners of the trunk, with the limbs held up."""
     q = _configuration(robot, 0.0, 0.1, -np.pi / 2, *[-np.pi] * 5)
@@ -251,6 +258,109 @@ def test_lies_on_its_back(robot):
     assert trunk["weight_share"] == pytest.approx(1.0, abs=1e-6)
     place = report["body.trunk.position"]
     np.testing.assert_allclose(place[:, :2], report["com"][:, :2], atol=1e-6)
+
+
+def _seat_shares(com):
+    """Of the weight: the least and the most that a seat under the trunk can bear, with feet."""
+    points = [
+        (forward, side + across, 0.0)
+        for side in (0.1, -0.1)
+        for forward in (SOLE_FORWARD - HALF_LENGTH, SOLE_FORWARD + HALF_LENGTH)
+        for across in (-HALF_WIDTH, HALF_WIDTH)
+    ]
+    feet = len(points)
+    height = ANKLE_HEIGHT + SHANK
+    points += [(-THIGH + x, y, height) for x in (-0.1, 0.1) for y in (-0.12, 0.12)]
+    count = len(points)
+    balance = np.zeros((6, 3 * count))
+    friction = []
+    for k, point in enumerate(points):
+        own = slice(3 * k, 3 * k + 3)
+        balance[:3, own] = np.eye(3)
+        balance[3:, own] = pin.skew(np.array(point) - com)
+        for axis in (0, 1):
+            for sign in (-1.0, 1.0):
+                row = np.zeros(3 * count)
+                row[3 * k + axis], row[3 * k + 2] = sign, -0.7
+                friction.append(row)
+    seat = np.zeros(3 * count)
+    seat[3 * feet + 2 :: 3] = 1.0
+    wrench = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    return [
+        sign
+        * linprog(
+            sign * seat,
+            A_ub=np.array(friction),
+            b_ub=np.zeros(len(friction)),
+            A_eq=balance,
+            b_eq=wrench,
+            bounds=(None, None),
+        ).fun
+        for sign in (1.0, -1.0)
+    ]
+
+
+def test_sits(robot):
+    """Nothing is known of the seat: what it would carry is said, and counts nowhere."""
+    frames = _sit(robot)
+    report = dynacom.analyze(_clip(robot, frames), robot)
+    summary = report.summary
+    assert summary["verdict"] == "not feasible"
+    assert summary["bodies"] == {}
+    (seat,) = summary["seats"]
+    assert seat["link"] == "trunk"
+    assert (seat["begin"], seat["end"]) == (0.0, 1.99)
+    assert seat["height"] == pytest.approx(ANKLE_HEIGHT + SHANK)
+    least, most = _seat_shares(_com(robot, frames[0]))
+    assert 0.3 < least - 0.01 <= seat["weight_share"] <= most + 0.01
+    notes = summary["notes"]
+    text = f"trunk would have to carry {seat['weight_share']:.0%} of the weight at 0.46 m from 0.00"
+    assert any(note.startswith(text) for note in notes)
+    assert any(
+        "Either there is a seat" in note and "in 200 of 200 frames" in note for note in notes
+    )
+    assert not any("load" in note for note in notes)
+    assert not any(name.startswith("body.") for name in report.columns())
+
+
+def test_a_seat_that_is_told_of(robot):
+    """As the note says: a contact on the link, and a schedule."""
+    names = [*robot.contacts, "trunk"]
+    seated = make_robot(
+        robot.urdf,
+        [f"{side}_sole:6d:{SOLE}" for side in ("left", "right")]
+        + ["trunk:6d:half_length=0.1,half_width=0.12,mu=0.7,gu=0.05"],
+    )
+    frames = _sit(seated)
+    schedule = dynacom.ContactSchedule(names, np.ones((len(frames), 3), dtype=bool))
+    report = dynacom.analyze(_clip(seated, frames), seated, schedule=schedule)
+    assert report.summary["verdict"] == "feasible", report.summary["reasons"]
+    assert report.summary["seats"] == []
+    assert report.summary["contact_missing"] is None
+
+
+def test_what_moves_sits_nowhere(robot):
+    """The same posture, to and fro by 10 cm."""
+    frames = _sit(robot)
+    frames[:, 0] += 0.1 * np.sin(np.pi * np.arange(len(frames)) / RATE)
+    report = dynacom.analyze(_clip(robot, frames), robot)
+    assert report.summary["verdict"] == "not feasible"
+    assert report.summary["seats"] == []
+    assert any("Either a contact is missing" in note for note in report.summary["notes"])
+
+
+def test_rows_of_a_batch_have_bodies_and_seats(robot, tmp_path):
+    made = {"kneel": _kneel(robot)[0], "sit": _sit(robot)}
+    for name, q in made.items():
+        np.savez(tmp_path / f"{name}.npz", t=np.arange(len(q)) / RATE, q=q)
+    table = dynacom.batch(tmp_path, robot).to_pylist()
+    for row, name in zip(table, made, strict=True):
+        summary = dynacom.analyze(tmp_path / f"{name}.npz", robot).summary
+        bodies = {body.pop("link"): body for body in row["bodies"]}
+        assert bodies == summary["bodies"]
+        assert row["seats"] == summary["seats"]
+    assert [bool(row["bodies"]) for row in table] == [True, False]
+    assert [bool(row["seats"]) for row in table] == [False, True]
 
 
 def test_standing_needs_nothing_else(robot):
