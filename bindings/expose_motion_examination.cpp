@@ -67,9 +67,11 @@ std::shared_ptr<MotionExaminer> makeExaminer(const DynaCoM& robot, double cutoff
   return std::make_shared<MotionExaminer>(robot, settings);
 }
 
-Examination examine(const MotionExaminer& examiner, const RecordedMotion& recorded) {
+// Not by value: what Python is given that way is copied.
+std::shared_ptr<Examination> examine(const MotionExaminer& examiner,
+                                     const RecordedMotion& recorded) {
   const WithoutLock without_lock;
-  return examiner.examine(recorded);
+  return std::make_shared<Examination>(examiner.examine(recorded));
 }
 
 }  // namespace
@@ -101,9 +103,9 @@ void exposeMotionExamination() {
       .def(PrintVisitor<Seat>(&writeSeat))
       .def(CopyVisitor<Seat>());
 
-  bp::class_<Examination>("MotionExamination",
-                          "All that was found of a recorded motion, see MotionExaminer.",
-                          bp::no_init)
+  bp::class_<Examination, std::shared_ptr<Examination>>(
+      "MotionExamination", "All that was found of a recorded motion, see MotionExaminer.",
+      bp::no_init)
       .def_readonly("derived", &Examination::derived, "The DerivedMotion")
       .add_property("contacts", &getContacts, "A ContactMotion for each contact")
       .add_property("parts", &getParts, "A PartRobot.Part for each part of the contacts")
@@ -134,8 +136,8 @@ void exposeMotionExamination() {
       "Judges recorded motions of one robot, a DynaCoM, which is copied: deriveMotion,\n"
       "computeContactMotions, inferContacts for the contacts' parts, analyzeMotion, gatherParts,\n"
       "judgeMotion and summarizeMotion, one after the other. The ground that the centre of\n"
-      "pressure lies on is the mean of those that are stood on. Threads and copies of the robot\n"
-      "are kept from one motion to the next.",
+      "pressure lies on is the mean of those that are stood on. Threads, solvers and storage are\n"
+      "kept from one motion to the next.",
       bp::no_init)
       .def("__init__",
            bp::make_constructor(

@@ -59,7 +59,8 @@ std::vector<Eigen::Index> chooseBlocks(const pinocchio::Model& model, const Eige
 
 // Of seven points, how far the sixth divided difference is from zero, as a number whose variance
 // is that of each point's noise, times √6 / h²: what the noise makes of a second difference.
-Eigen::Vector3d measureWindow(const double* time, const Eigen::Vector3d* points) {
+Eigen::Vector3d measureWindow(const double* time,
+                              const Eigen::Ref<const Eigen::Matrix<double, 3, kNodes>>& points) {
   const double step = (time[kNodes - 1] - time[0]) / double(kNodes - 1);
   Eigen::Vector3d difference = Eigen::Vector3d::Zero();
   double squares = 0.;
@@ -68,33 +69,39 @@ Eigen::Vector3d measureWindow(const double* time, const Eigen::Vector3d* points)
     for (Eigen::Index j = 0; j < kNodes; ++j)
       if (j != i) weight *= step / (time[i] - time[j]);
     squares += weight * weight;
-    difference += weight * points[i];
+    difference += weight * points.col(i);
   }
   return difference.cwiseAbs() * std::sqrt(6. / squares) / (step * step);
 }
 
 }  // namespace
 
-double internal::estimateAccelerationNoise(const pinocchio::Model& model, pinocchio::Data& data,
-                                           const Eigen::VectorXd& time, const Eigen::MatrixXd& q,
-                                           Eigen::Index stride) {
-  std::array<std::vector<double>, 3> measured;
-  std::array<double, kBlock> times;
-  std::array<Eigen::Vector3d, kBlock> points;
-  for (const Eigen::Index first : chooseBlocks(model, q, stride)) {
-    Eigen::Index length = 0;
-    for (; length < kBlock && first + length * stride < q.cols(); ++length) {
-      const auto k = static_cast<std::size_t>(length);
-      times[k] = time[first + length * stride];
-      points[k] = pinocchio::centerOfMass(model, data, q.col(first + length * stride), false);
+double internal::estimateAccelerationNoise(const pinocchio::Model& model,
+                                           const CoMFunction& findCoM, const Eigen::VectorXd& time,
+                                           const Eigen::MatrixXd& q, Eigen::Index stride) {
+  const std::vector<Eigen::Index> blocks = chooseBlocks(model, q, stride);
+  Eigen::MatrixXd chosen(q.rows(), kBlock * Eigen::Index(blocks.size()));
+  std::vector<double> times;
+  std::vector<Eigen::Index> begins;  // of blocks, among those
+  for (const Eigen::Index first : blocks) {
+    begins.push_back(Eigen::Index(times.size()));
+    for (Eigen::Index k = 0; k < kBlock && first + k * stride < q.cols(); ++k) {
+      chosen.col(Eigen::Index(times.size())) = q.col(first + k * stride);
+      times.push_back(time[first + k * stride]);
     }
-    for (Eigen::Index window = 0; window + kNodes <= length; ++window) {
-      const Eigen::Vector3d noise = measureWindow(&times[static_cast<std::size_t>(window)],
-                                                  &points[static_cast<std::size_t>(window)]);
+  }
+  const auto count = static_cast<Eigen::Index>(times.size());
+  begins.push_back(count);
+  const Eigen::Matrix3Xd points = findCoM(chosen.leftCols(count));
+
+  std::array<std::vector<double>, 3> measured;
+  for (std::size_t block = 0; block < blocks.size(); ++block)
+    for (Eigen::Index k = begins[block]; k + kNodes <= begins[block + 1]; ++k) {
+      const Eigen::Vector3d noise =
+          measureWindow(&times[static_cast<std::size_t>(k)], points.middleCols<kNodes>(k));
       for (std::size_t axis = 0; axis < 3; ++axis)
         measured[axis].push_back(noise[static_cast<Eigen::Index>(axis)]);
     }
-  }
   if (measured[0].empty()) return internal::kNaN;
   double square = 0.;
   for (std::vector<double>& axis : measured) {
@@ -111,7 +118,18 @@ double estimateAccelerationNoise(const pinocchio::Model& model, const Eigen::Vec
   internal::requireConfigurations(model, q, time.size());
   if (stride < 1) internal::throwInvalid("stride must be >= 1, got ", stride);
   pinocchio::Data data(model);
-  return internal::estimateAccelerationNoise(model, data, time, q, stride);
+  const auto findCoM = [&](const Eigen::MatrixXd& chosen) {
+    return internal::findCoM(model, data, chosen);
+  };
+  return internal::estimateAccelerationNoise(model, findCoM, time, q, stride);
+}
+
+Eigen::Matrix3Xd internal::findCoM(const pinocchio::Model& model, pinocchio::Data& data,
+                                   const Eigen::MatrixXd& q) {
+  Eigen::Matrix3Xd com(3, q.cols());
+  for (Eigen::Index frame = 0; frame < q.cols(); ++frame)
+    com.col(frame) = pinocchio::centerOfMass(model, data, q.col(frame), false);
+  return com;
 }
 
 }  // namespace dynacom

@@ -10,6 +10,7 @@
 
 #include "check.hpp"
 #include "contact_frame.hpp"
+#include "contact_split.hpp"
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "nan.hpp"
@@ -35,6 +36,10 @@ std::string addFrame(pinocchio::Model& model, pinocchio::JointIndex joint,
   while (model.existFrame(name)) name += '_';
   model.addFrame(pinocchio::Frame(name, joint, placement, pinocchio::OP_FRAME));
   return name;
+}
+
+const ContactPointSettings& settingsOf(const ContactBase& point) {
+  return dynamic_cast<const ContactPoint&>(point).getSettings();
 }
 
 pinocchio::SE3 makeOffset(const Eigen::Vector3d& offset) {
@@ -125,9 +130,17 @@ MotionAnalysis::Contact makeContact(const std::string& name, Eigen::Index frames
   return contact;
 }
 
+// How many contacts parts have, besides those of bodies.
+std::size_t countContactsOf(const std::vector<PartRobot::Part>& parts, std::size_t bodies) {
+  std::size_t count = 0;
+  for (const PartRobot::Part& part : parts) count = std::max(count, part.contact + 1);
+  return count - std::min(count, bodies);
+}
+
 // A schedule for owners of parts, whose numbers begin with `first`.
-ContactSchedule gather(const PartRobot& parts, std::size_t first, std::vector<std::string> owners,
-                       const ContactSchedule& schedule) {
+ContactSchedule gather(const std::vector<PartRobot::Part>& parts, std::size_t first,
+                       std::vector<std::string> owners, const ContactSchedule& schedule) {
+  internal::requireSize("schedule.names", schedule.names.size(), parts.size(), "parts");
   const Eigen::Index frames = schedule.active.cols();
   schedule.validate(frames);
   ContactSchedule gathered;
@@ -135,9 +148,9 @@ ContactSchedule gather(const PartRobot& parts, std::size_t first, std::vector<st
   const auto count = static_cast<Eigen::Index>(gathered.names.size());
   gathered.active.setConstant(count, frames, false);
   if (schedule.confidence.size() > 0) gathered.confidence.setZero(count, frames);
-  for (std::size_t k = 0; k < parts.parts.size(); ++k) {
-    const auto owner = static_cast<Eigen::Index>(parts.parts[k].contact - first);
-    if (parts.parts[k].contact < first || owner >= count) continue;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const auto owner = static_cast<Eigen::Index>(parts[k].contact - first);
+    if (parts[k].contact < first || owner >= count) continue;
     const auto part = static_cast<Eigen::Index>(k);
     gathered.active.row(owner) = gathered.active.row(owner) || schedule.active.row(part);
     if (schedule.confidence.size() > 0)
@@ -147,96 +160,15 @@ ContactSchedule gather(const PartRobot& parts, std::size_t first, std::vector<st
   return gathered;
 }
 
-}  // namespace
-
-std::size_t PartRobot::countContacts() const {
-  std::size_t count = 0;
-  for (const Part& part : parts) count = std::max(count, part.contact + 1);
-  return count - std::min(count, bodies.size());
-}
-
-PartRobot splitContacts(const DynaCoM& robot, const std::vector<BodyPoints>& bodies) {
-  if (!robot.isInitialized())
-    throw NotReadyError("DynaCoM is used by splitContacts before initialize()");
-  const std::vector<std::string> names = robot.getKnownContacts();
-  pinocchio::Model model = robot.getModel();
-  std::vector<PartRobot::Part> parts;
-  std::vector<ContactPointSettings> settings;
-  std::vector<pinocchio::JointIndex> joints;
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    const ContactBase& contact = *robot.getContact(names[k]);
-    const pinocchio::Frame frame = internal::getFrame(robot.getModel(), contact, names[k]);
-    if (const auto* point = dynamic_cast<const ContactPoint*>(&contact)) {
-      parts.push_back({names[k], k, 0});
-      settings.push_back(point->getSettings());
-      joints.push_back(frame.parentJoint);
-    } else if (const auto* surface = dynamic_cast<const Contact6D*>(&contact)) {
-      const Eigen::Matrix2Xd corners = surface->getCorners();
-      for (Eigen::Index i = 0; i < corners.cols(); ++i) {
-        const std::string name = names[k] + "." + nameCorner(corners.col(i));
-        ContactPointSettings part;
-        part.mu = surface->getSettings().mu;
-        part.weights = std::sqrt(double(corners.cols())) * surface->getSettings().weights.head<3>();
-        part.world_aligned = true;
-        const Eigen::Vector3d corner(corners(0, i), corners(1, i), 0.);
-        part.frame_name =
-            addFrame(model, frame.parentJoint, frame.placement * makeOffset(corner), name);
-        parts.push_back({name, k, 0});
-        settings.push_back(part);
-        joints.push_back(frame.parentJoint);
-      }
-    } else {
-      throwInvalid("contact '", names[k],
-                   "' must be a ContactPoint or a Contact6D to be taken apart, got another kind");
-    }
-  }
-  Limbs limbs(model);
-  for (const pinocchio::JointIndex joint : joints) limbs.add(joint);
-  for (std::size_t k = 0; k < parts.size(); ++k) parts[k].limb = limbs.find(joints[k]);
-
-  double mu = settings.empty() ? kBodyFriction : std::numeric_limits<double>::infinity();
-  for (const ContactPointSettings& part : settings) mu = std::min(mu, part.mu);
-  ContactPointSettings point;
-  point.mu = mu;
-  if (!settings.empty()) point.weights = settings.front().weights;
-  point.world_aligned = true;
-  int limb = 0;
-  for (const PartRobot::Part& part : parts) limb = std::max(limb, part.limb + 1);
-  std::vector<std::string> links;
-  for (const BodyPoints& body : bodies) {
-    if (body.points.cols() == 0) continue;
-    if (body.joint == 0 || body.joint >= static_cast<std::size_t>(model.njoints))
-      throwInvalid("body '", body.link, "': joint must be one of the robot's, 1 to ",
-                   model.njoints - 1, ", got ", body.joint);
-    internal::requireSize("radius", body.radius.size(), body.points.cols(), "points");
-    for (Eigen::Index i = 0; i < body.points.cols(); ++i) {
-      const std::string name = "body." + body.link + "." + std::to_string(i);
-      point.radius = body.radius[i];
-      point.frame_name = addFrame(model, body.joint, makeOffset(body.points.col(i)), name);
-      parts.push_back({name, names.size() + links.size(), limb});
-      settings.push_back(point);
-    }
-    links.push_back(body.link);
-    ++limb;
-  }
-
-  PartRobot split{DynaCoM(model), std::move(parts), std::move(links)};
-  split.robot.setGroundHeight(robot.getGroundHeight());
-  split.robot.setMinimalVerticalForce(robot.getMinimalVerticalForce());
-  split.robot.setWrenchWeights(robot.getWrenchWeights());
-  split.robot.setMaximalIterations(robot.getMaximalIterations());
-  for (std::size_t k = 0; k < split.parts.size(); ++k)
-    split.robot.addContact(std::make_shared<ContactPoint>(settings[k]), split.parts[k].name);
-  return split;
-}
-
-MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
-                           const std::vector<ContactMotion>& contacts,
-                           const std::vector<ContactMotion>& motions, MotionAnalysis analysis) {
+// As the public function of that name, for parts and bodies of whatever was split.
+MotionAnalysis gather(const DynaCoM& robot, const std::vector<PartRobot::Part>& parts,
+                      const std::vector<std::string>& links,
+                      const std::vector<ContactMotion>& contacts,
+                      const std::vector<ContactMotion>& motions, MotionAnalysis analysis) {
   const std::vector<std::string> names = robot.getKnownContacts();
   internal::requireSize("contacts", contacts.size(), names.size(), "contacts of the robot");
-  internal::requireSize("motions", motions.size(), parts.parts.size(), "parts");
-  internal::requireSize("analysis.contacts", analysis.contacts.size(), parts.parts.size(), "parts");
+  internal::requireSize("motions", motions.size(), parts.size(), "parts");
+  internal::requireSize("analysis.contacts", analysis.contacts.size(), parts.size(), "parts");
   const Eigen::Index frames = analysis.time.size();
   for (const auto* list : {&contacts, &motions})
     for (const ContactMotion& moved : *list)
@@ -244,9 +176,9 @@ MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
 
   std::vector<MotionAnalysis::Contact> gathered;
   std::vector<Gatherer> gatherers;
-  std::vector<MotionAnalysis::Body> bodies(parts.bodies.size());
+  std::vector<MotionAnalysis::Body> bodies(links.size());
   for (std::size_t k = 0; k < bodies.size(); ++k) {
-    bodies[k].link = parts.bodies[k];
+    bodies[k].link = links[k];
     bodies[k].active.setConstant(frames, false);
     bodies[k].force.setZero(3, frames);
     bodies[k].position.setZero(3, frames);
@@ -261,10 +193,10 @@ MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
   std::vector<DynaCoM::Vector6> wrenches(names.size());
   for (Eigen::Index frame = 0; frame < frames; ++frame) {
     for (DynaCoM::Vector6& wrench : wrenches) wrench.setZero();
-    for (std::size_t k = 0; k < parts.parts.size(); ++k) {
+    for (std::size_t k = 0; k < parts.size(); ++k) {
       const MotionAnalysis::Contact& part = analysis.contacts[k];
       if (!part.active[frame]) continue;
-      const std::size_t owner = parts.parts[k].contact;
+      const std::size_t owner = parts[k].contact;
       const Eigen::Vector3d force =  // in the world
           findRotation(motions[k], frame) * part.wrench.col(frame).head<3>();
       if (owner >= names.size()) {
@@ -303,15 +235,133 @@ MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
   return analysis;
 }
 
+}  // namespace
+
+std::size_t PartRobot::countContacts() const { return countContactsOf(parts, bodies.size()); }
+
+std::size_t internal::ContactSplit::countContacts() const {
+  return countContactsOf(parts, bodies.size());
+}
+
+internal::ContactSplit internal::splitCarrier(const DynaCoM& robot,
+                                              const std::vector<BodyPoints>& bodies) {
+  const pinocchio::Model& model = robot.getModel();
+  ContactSplit split = {{}, {}, describeCarrier(robot)};
+  const std::vector<FixedContact> contacts = std::move(split.carrier.contacts);
+  std::vector<FixedContact>& points = split.carrier.contacts;
+  points.clear();
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const FixedContact& whole = contacts[k];
+    if (dynamic_cast<const ContactPoint*>(whole.contact.get())) {
+      split.parts.push_back({whole.name, k, 0});
+      points.push_back(whole);
+    } else if (const auto* surface = dynamic_cast<const Contact6D*>(whole.contact.get())) {
+      const Eigen::Matrix2Xd corners = surface->getCorners();
+      ContactPointSettings part;
+      part.mu = surface->getSettings().mu;
+      part.weights = std::sqrt(double(corners.cols())) * surface->getSettings().weights.head<3>();
+      part.world_aligned = true;
+      for (Eigen::Index i = 0; i < corners.cols(); ++i) {
+        part.frame_name = whole.name + "." + nameCorner(corners.col(i));
+        const Eigen::Vector3d corner(corners(0, i), corners(1, i), 0.);
+        split.parts.push_back({part.frame_name, k, 0});
+        points.push_back({part.frame_name, std::make_shared<ContactPoint>(part), whole.joint,
+                          whole.placement * makeOffset(corner)});
+      }
+    } else {
+      throwInvalid("contact '", whole.name,
+                   "' must be a ContactPoint or a Contact6D to be taken apart, got another kind");
+    }
+  }
+  Limbs limbs(model);
+  for (const FixedContact& point : points) limbs.add(point.joint);
+  int limb = 0;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    split.parts[k].limb = limbs.find(points[k].joint);
+    limb = std::max(limb, split.parts[k].limb + 1);
+  }
+
+  ContactPointSettings point;
+  point.mu = points.empty() ? kBodyFriction : std::numeric_limits<double>::infinity();
+  for (const FixedContact& part : points)
+    point.mu = std::min(point.mu, settingsOf(*part.contact).mu);
+  if (!points.empty()) point.weights = settingsOf(*points.front().contact).weights;
+  point.world_aligned = true;
+  for (const BodyPoints& body : bodies) {
+    if (body.points.cols() == 0) continue;
+    if (body.joint == 0 || body.joint >= static_cast<std::size_t>(model.njoints))
+      throwInvalid("body '", body.link, "': joint must be one of the robot's, 1 to ",
+                   model.njoints - 1, ", got ", body.joint);
+    requireSize("radius", body.radius.size(), body.points.cols(), "points");
+    for (Eigen::Index i = 0; i < body.points.cols(); ++i) {
+      point.frame_name = "body." + body.link + "." + std::to_string(i);
+      point.radius = body.radius[i];
+      split.parts.push_back({point.frame_name, contacts.size() + split.bodies.size(), limb});
+      points.push_back({point.frame_name, std::make_shared<ContactPoint>(point), body.joint,
+                        makeOffset(body.points.col(i))});
+    }
+    split.bodies.push_back(body.link);
+    ++limb;
+  }
+  return split;
+}
+
+PartRobot splitContacts(const DynaCoM& robot, const std::vector<BodyPoints>& bodies) {
+  if (!robot.isInitialized())
+    throw NotReadyError("DynaCoM is used by splitContacts before initialize()");
+  internal::ContactSplit parts = internal::splitCarrier(robot, bodies);
+  const std::vector<std::string> names = robot.getKnownContacts();
+  pinocchio::Model model = robot.getModel();
+  std::vector<std::shared_ptr<ContactPoint>> points;
+  for (std::size_t k = 0; k < parts.parts.size(); ++k) {
+    const internal::FixedContact& fixed = parts.carrier.contacts[k];
+    ContactPointSettings settings = settingsOf(*fixed.contact);
+    // A contact that is a point has a frame already.
+    const std::size_t owner = parts.parts[k].contact;
+    if (owner >= names.size() || parts.parts[k].name != names[owner])
+      settings.frame_name = addFrame(model, fixed.joint, fixed.placement, fixed.name);
+    points.push_back(std::make_shared<ContactPoint>(settings));
+  }
+  PartRobot split{DynaCoM(model), std::move(parts.parts), std::move(parts.bodies)};
+  split.robot.setGroundHeight(robot.getGroundHeight());
+  split.robot.setMinimalVerticalForce(robot.getMinimalVerticalForce());
+  split.robot.setWrenchWeights(robot.getWrenchWeights());
+  split.robot.setWarmStart(robot.getWarmStart());
+  split.robot.setMaximalIterations(robot.getMaximalIterations());
+  for (std::size_t k = 0; k < points.size(); ++k)
+    split.robot.addContact(points[k], split.parts[k].name);
+  return split;
+}
+
+MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
+                           const std::vector<ContactMotion>& contacts,
+                           const std::vector<ContactMotion>& motions, MotionAnalysis analysis) {
+  return gather(robot, parts.parts, parts.bodies, contacts, motions, std::move(analysis));
+}
+
+MotionAnalysis internal::gatherParts(const DynaCoM& robot, const ContactSplit& split,
+                                     const std::vector<ContactMotion>& contacts,
+                                     const std::vector<ContactMotion>& motions,
+                                     MotionAnalysis analysis) {
+  return gather(robot, split.parts, split.bodies, contacts, motions, std::move(analysis));
+}
+
 ContactSchedule gatherParts(const DynaCoM& robot, const PartRobot& parts,
                             const ContactSchedule& schedule) {
-  internal::requireSize("schedule.names", schedule.names.size(), parts.parts.size(), "parts");
-  return gather(parts, 0, robot.getKnownContacts(), schedule);
+  return gather(parts.parts, 0, robot.getKnownContacts(), schedule);
+}
+
+ContactSchedule internal::gatherParts(const std::vector<std::string>& contacts,
+                                      const ContactSplit& split, const ContactSchedule& schedule) {
+  return gather(split.parts, 0, contacts, schedule);
 }
 
 ContactSchedule gatherBodies(const PartRobot& parts, const ContactSchedule& schedule) {
-  internal::requireSize("schedule.names", schedule.names.size(), parts.parts.size(), "parts");
-  return gather(parts, parts.countContacts(), parts.bodies, schedule);
+  return gather(parts.parts, parts.countContacts(), parts.bodies, schedule);
+}
+
+ContactSchedule internal::gatherBodies(const ContactSplit& split, const ContactSchedule& schedule) {
+  return gather(split.parts, split.countContacts(), split.bodies, schedule);
 }
 
 }  // namespace dynacom

@@ -7,7 +7,6 @@
 #include <string>
 #include <typeinfo>
 
-#include "contact_frame.hpp"
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #ifdef DYNACOM_HAS_LANES
@@ -124,38 +123,33 @@ void write(const pinocchio::SE3& placement, double* numbers) {
   Vector3::Map(numbers + 9) = placement.translation();
 }
 
-// Writes the size and the limits; false for a kind that lanes do not know.
-bool describe(const ContactBase& contact, lanes::Contact& description) {
-  Eigen::Map<Vector6> betas(description.betas), weights(description.weights);
-  betas.setZero();
-  weights.setOnes();
-  description.size = static_cast<int>(contact.cols());
-  weights.head(contact.cols()) = contact.reg_A();
-  if (typeid(contact) == typeid(Contact6D)) {
-    const Contact6DSettings& settings = static_cast<const Contact6D&>(contact).getSettings();
-    description.world_aligned = false;
-    description.radius = 0.;
-    betas << settings.mu, settings.mu, 0., settings.half_width, settings.half_length, settings.gu;
-    return true;
-  }
-  if (typeid(contact) == typeid(ContactPoint)) {
-    const ContactPointSettings& settings = static_cast<const ContactPoint&>(contact).getSettings();
-    description.world_aligned = settings.world_aligned;
-    description.radius = settings.radius;
-    betas.head<2>().setConstant(settings.mu);
-    return true;
-  }
-  return false;
+// The contacts that lanes know.
+const Contact6D* asSurface(const ContactBase& contact) {
+  return typeid(contact) == typeid(Contact6D) ? static_cast<const Contact6D*>(&contact) : nullptr;
+}
+const ContactPoint* asPoint(const ContactBase& contact) {
+  return typeid(contact) == typeid(ContactPoint) ? static_cast<const ContactPoint*>(&contact)
+                                                 : nullptr;
+}
+
+bool isAligned(const ContactBase& contact) {
+  const ContactPoint* point = asPoint(contact);
+  return point && point->getSettings().world_aligned;
+}
+
+// Where a contact's column of a frame is.
+template <class Values>
+auto columnOf(Values& values, Eigen::Index frame) {
+  return values.data() + frame * values.rows();
 }
 
 }  // namespace
 
-std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, int lanes) {
+std::optional<LaneRobot> LaneRobot::make(const pinocchio::Model& model,
+                                         const std::vector<FixedContact>& contacts, int lanes) {
   LaneRobot made;
   made.interface_ = findInterface(lanes);
-  if (!made.interface_) return std::nullopt;
-  const pinocchio::Model& model = robot.getModel();
-  if (model.njoints < 2) return std::nullopt;
+  if (!made.interface_ || model.njoints < 2) return std::nullopt;
 
   // From the axes that lanes want, of which z is the joint's, to those of the joint.
   std::vector<pinocchio::SE3> aligned = {pinocchio::SE3::Identity()};
@@ -184,98 +178,149 @@ std::optional<LaneRobot> LaneRobot::make(const DynaCoM& robot, int lanes) {
         about_com(2, 0), about_com(2, 1), about_com(2, 2);
     made.joints_.push_back(joint);
   }
-  for (const std::string& name : robot.getKnownContacts()) {
-    const ContactBase& contact = *robot.getContact(name);
-    const pinocchio::Frame& frame = getFrame(model, contact, name);
-    lanes::Contact description = {};
-    if (frame.parentJoint == 0 || !describe(contact, description)) return std::nullopt;
-    description.parent = static_cast<int>(frame.parentJoint) - 1;
-    write(aligned[frame.parentJoint].actInv(frame.placement), description.placement);
-    made.contacts_.push_back(description);
+  for (const FixedContact& fixed : contacts) {
+    const Contact6D* surface = asSurface(*fixed.contact);
+    const ContactPoint* point = asPoint(*fixed.contact);
+    if (fixed.joint == 0 || (!surface && !point)) return std::nullopt;
+    lanes::Fixture fixture = {};
+    fixture.parent = static_cast<int>(fixed.joint) - 1;
+    write(aligned[fixed.joint].actInv(fixed.placement), fixture.placement);
+    if (point) {
+      fixture.world_aligned = point->getSettings().world_aligned;
+      fixture.radius = point->getSettings().radius;
+    } else {
+      fixture.half_length = surface->getSettings().half_length;
+      fixture.half_width = surface->getSettings().half_width;
+    }
+    made.contacts_.push_back(fixture);
   }
-
-  made.robot_.nq = model.nq;
-  made.robot_.nv = model.nv;
-  made.robot_.joints = static_cast<int>(made.joints_.size());
-  made.robot_.contacts = static_cast<int>(made.contacts_.size());
-  Vector3::Map(made.robot_.gravity) = robot.getSettings().gravity;
-  Vector6::Map(made.robot_.wrench_weights) = robot.getWrenchWeights();
-  made.robot_.minimal_vertical_force = robot.getMinimalVerticalForce();
+  made.nq_ = model.nq;
+  made.nv_ = model.nv;
+  made.gravity_ = model.gravity.linear();
   return made;
 }
 
-LaneAnalysis::LaneAnalysis(const LaneRobot& robot, double ground_height,
-                           bool flat_horizontal_ground)
-    : interface_(*robot.interface_), analysis_(nullptr, interface_.destroy) {
-  lanes::Robot description = robot.robot_;
+LaneSweeper::LaneSweeper(const LaneRobot& robot)
+    : interface_(*robot.interface_), worker_(nullptr, interface_.destroy_sweeper) {
+  lanes::Robot description = {};
+  description.nq = robot.nq_;
+  description.nv = robot.nv_;
+  description.joints = static_cast<int>(robot.joints_.size());
   description.joint = robot.joints_.data();
+  description.contacts = static_cast<int>(robot.contacts_.size());
   description.contact = robot.contacts_.data();
+  Vector3::Map(description.gravity) = robot.gravity_;
+  worker_.reset(interface_.create_sweeper(&description));
+  if (!worker_) throw std::bad_alloc();
+  rows_.resize(robot.contacts_.size());
+  for (const lanes::Fixture& contact : robot.contacts_)
+    is_aligned_.push_back(contact.world_aligned);
+}
+
+void LaneSweeper::run(const Motion& motion, Eigen::Index first, Eigen::Index frames,
+                      MotionAnalysis* dynamics, std::vector<ContactMotion>& contacts) {
+  known_.resize(frames);
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    ContactMotion& contact = contacts[k];
+    rows_[k] = {columnOf(contact.position, first), contact.height.data() + first,
+                columnOf(contact.velocity, first),
+                is_aligned_[k] ? nullptr : columnOf(contact.rotation, first)};
+  }
+  lanes::Sweep sweep = {};
+  sweep.count = frames;
+  sweep.q = columnOf(motion.q, first);
+  sweep.v = columnOf(motion.v, first);
+  if (dynamics) {
+    sweep.a = columnOf(motion.a, first);
+    sweep.com = columnOf(dynamics->com, first);
+    sweep.vcom = columnOf(dynamics->vcom, first);
+    sweep.acom = columnOf(dynamics->acom, first);
+    sweep.am = columnOf(dynamics->am, first);
+    sweep.dam = columnOf(dynamics->dam, first);
+    sweep.force = columnOf(dynamics->ground_force, first);
+    sweep.torque = columnOf(dynamics->ground_torque, first);
+  }
+  sweep.contacts = rows_.data();
+  sweep.known = known_.data();
+  interface_.sweep(worker_.get(), &sweep);
+}
+
+std::optional<LaneCarrier> LaneCarrier::make(const Carrier& carrier, int lanes) {
+  LaneCarrier made;
+  made.interface_ = findInterface(lanes);
+  if (!made.interface_) return std::nullopt;
+  for (const FixedContact& fixed : carrier.contacts) {
+    const ContactBase& contact = *fixed.contact;
+    const Contact6D* surface = asSurface(contact);
+    const ContactPoint* point = asPoint(contact);
+    if (!surface && !point) return std::nullopt;
+    lanes::Contact description = {};
+    Eigen::Map<Vector6> betas(description.betas), weights(description.weights);
+    weights.setOnes();
+    description.size = static_cast<int>(contact.cols());
+    weights.head(contact.cols()) = contact.reg_A();
+    if (surface) {
+      const Contact6DSettings& settings = surface->getSettings();
+      betas << settings.mu, settings.mu, 0., settings.half_width, settings.half_length, settings.gu;
+    } else {
+      betas.head<2>().setConstant(point->getSettings().mu);
+    }
+    made.contacts_.push_back(description);
+    made.is_aligned_.push_back(isAligned(contact));
+  }
+  made.carrier_.contacts = static_cast<int>(made.contacts_.size());
+  made.carrier_.mass = carrier.mass;
+  Vector3::Map(made.carrier_.gravity) = carrier.gravity;
+  Vector6::Map(made.carrier_.wrench_weights) = carrier.wrench_weights;
+  made.carrier_.minimal_vertical_force = carrier.minimal_vertical_force;
+  return made;
+}
+
+LaneSharer::LaneSharer(const LaneCarrier& carrier, double ground_height,
+                       bool flat_horizontal_ground)
+    : interface_(*carrier.interface_),
+      worker_(nullptr, interface_.destroy_sharer),
+      rows_(carrier.contacts_.size()),
+      is_aligned_(carrier.is_aligned_) {
+  lanes::Carrier description = carrier.carrier_;
+  description.contact = carrier.contacts_.data();
   description.ground_height = ground_height;
   description.flat_horizontal_ground = flat_horizontal_ground;
-  analysis_.reset(interface_.create(&description));
-  if (!analysis_) throw std::bad_alloc();
-  rows_.resize(robot.contacts_.size());
+  worker_.reset(interface_.create_sharer(&description));
+  if (!worker_) throw std::bad_alloc();
 }
 
-void LaneAnalysis::run(const Motion& motion, Eigen::Index first, Eigen::Index frames,
-                       const Eigen::MatrixXd& readiness, MotionAnalysis& result) {
-  const auto size = static_cast<std::size_t>(frames);
-  outcomes_.resize(size);
-  placements_.resize(12 * rows_.size() * size);
-  const auto from = [first](auto& values) { return values.data() + first * values.rows(); };
-  const auto number = [first](auto& values) { return values.data() + first; };
+void LaneSharer::run(Eigen::Index first, Eigen::Index frames,
+                     const std::vector<ContactMotion>& contacts, const Eigen::MatrixXd& readiness,
+                     MotionAnalysis& result) {
+  answered_.resize(frames);
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     MotionAnalysis::Contact& contact = result.contacts[k];
-    const double* own_readiness =
+    lanes::ContactRows& rows = rows_[k];
+    rows.active = contact.active.data() + first;
+    rows.readiness =
         readiness.size() > 0 ? readiness.col(static_cast<Eigen::Index>(k)).data() + first : nullptr;
-    rows_[k] = {number(contact.active),    own_readiness,
-                from(contact.wrench),      number(contact.vertical_force),
-                from(contact.cop),         number(contact.friction_usage),
-                number(contact.yaw_usage), number(contact.cop_margin)};
+    rows.position = columnOf(contacts[k].position, first);
+    rows.rotation = is_aligned_[k] ? nullptr : columnOf(contacts[k].rotation, first);
+    rows.wrench = columnOf(contact.wrench, first);
+    rows.vertical_force = contact.vertical_force.data() + first;
+    rows.cop = columnOf(contact.cop, first);
+    rows.friction_usage = contact.friction_usage.data() + first;
+    rows.yaw_usage = contact.yaw_usage.data() + first;
+    rows.cop_margin = contact.cop_margin.data() + first;
   }
-  lanes::Frames described = {};
-  described.count = frames;
-  described.q = from(motion.q);
-  described.v = from(motion.v);
-  described.a = from(motion.a);
-  described.com = from(result.com);
-  described.vcom = from(result.vcom);
-  described.acom = from(result.acom);
-  described.am = from(result.am);
-  described.dam = from(result.dam);
-  described.force = from(result.ground_force);
-  described.torque = from(result.ground_torque);
-  described.cop = from(result.cop);
-  described.feasible_acom = from(result.feasible_acom);
-  described.feasible_dam = from(result.feasible_dam);
-  described.residual = from(result.residual);
-  described.contacts = rows_.data();
-  described.placements = placements_.data();
-  described.outcomes = outcomes_.data();
-  interface_.run(analysis_.get(), &described);
-}
-
-void LaneAnalysis::place(const Motion& motion, Eigen::Index first, Eigen::Index frames) {
-  const auto size = static_cast<std::size_t>(frames);
-  outcomes_.resize(size);
-  placements_.resize(12 * rows_.size() * size);
-  velocities_.resize(6 * rows_.size() * size);
-  const lanes::Places places = {frames,
-                                motion.q.col(first).data(),
-                                motion.v.col(first).data(),
-                                placements_.data(),
-                                velocities_.data(),
-                                outcomes_.data()};
-  interface_.place(analysis_.get(), &places);
-}
-
-pinocchio::SE3 LaneAnalysis::placement(std::size_t contact, Eigen::Index frame) const {
-  const double* numbers = placements_.data() + 12 * index(contact, frame);
-  return {Matrix3::Map(numbers), Vector3::Map(numbers + 9)};
-}
-
-pinocchio::Motion LaneAnalysis::velocity(std::size_t contact, Eigen::Index frame) const {
-  return pinocchio::Motion(Vector6::Map(velocities_.data() + 6 * index(contact, frame)));
+  lanes::Shares shares = {};
+  shares.count = frames;
+  shares.com = columnOf(result.com, first);
+  shares.force = columnOf(result.ground_force, first);
+  shares.torque = columnOf(result.ground_torque, first);
+  shares.cop = columnOf(result.cop, first);
+  shares.feasible_acom = columnOf(result.feasible_acom, first);
+  shares.feasible_dam = columnOf(result.feasible_dam, first);
+  shares.residual = columnOf(result.residual, first);
+  shares.contacts = rows_.data();
+  shares.answered = answered_.data();
+  interface_.share(worker_.get(), &shares);
 }
 
 }  // namespace dynacom::internal

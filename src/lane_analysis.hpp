@@ -5,69 +5,100 @@
 #include <optional>
 #include <vector>
 
+#include "carrier.hpp"
 #include "dynacom/motion_analysis.hpp"
 #include "lanes.hpp"
 
 namespace dynacom::internal {
 
-/// Several frames of a motion at once: a robot as lanes know it, and the shared object that this
-/// processor can run.
+/// Both steps of an analysis for several frames of a motion at once, by the shared object that this
+/// processor can run. Descriptions are made once, and each thread has workers of its own.
+
+/// A robot that moves as lanes know it.
 class LaneRobot {
  public:
   /// Nothing, where there is no such object, or where the robot has joints or contacts of other
   /// kinds.
   /// @param lanes  at most so many frames at once
-  static std::optional<LaneRobot> make(const DynaCoM& robot, int lanes);
+  static std::optional<LaneRobot> make(const pinocchio::Model& model,
+                                       const std::vector<FixedContact>& contacts, int lanes);
 
   int lanes() const { return interface_->lanes; }
 
  private:
-  friend class LaneAnalysis;
+  friend class LaneSweeper;
   LaneRobot() = default;
 
   const lanes::Interface* interface_ = nullptr;
-  lanes::Robot robot_ = {};
+  int nq_ = 0, nv_ = 0;
+  Eigen::Vector3d gravity_ = Eigen::Vector3d::Zero();
   std::vector<lanes::Joint> joints_;
-  std::vector<lanes::Contact> contacts_;
+  std::vector<lanes::Fixture> contacts_;
 };
 
-/// What a thread has for that.
-class LaneAnalysis {
+/// What a motion needs, and how contacts lie and move.
+class LaneSweeper {
  public:
-  /// @param robot                   must outlive this
+  /// @throws std::bad_alloc
+  explicit LaneSweeper(const LaneRobot& robot);
+
+  /// @param dynamics  where there is room for what the motion needs; null if nobody wants that
+  /// @param contacts  where there is room for how the contacts lie and move; rotations of
+  ///                  contacts that have the world's axes are left as they are
+  void run(const Motion& motion, Eigen::Index first, Eigen::Index frames, MotionAnalysis* dynamics,
+           std::vector<ContactMotion>& contacts);
+
+  /// Whether a frame of the last run(), counted from its first, is known; else what was written of
+  /// it is nothing.
+  bool isKnown(Eigen::Index frame) const { return known_[frame]; }
+
+ private:
+  const lanes::Interface& interface_;
+  std::unique_ptr<void, void (*)(void*)> worker_;
+  std::vector<lanes::PlaceRows> rows_;
+  std::vector<bool> is_aligned_;  // contacts that have the world's axes
+  Eigen::Array<bool, Eigen::Dynamic, 1> known_;
+};
+
+/// Contacts that share wrenches as lanes know it.
+class LaneCarrier {
+ public:
+  /// Nothing, where there is no such object, or where there are contacts of other kinds.
+  static std::optional<LaneCarrier> make(const Carrier& carrier, int lanes);
+
+ private:
+  friend class LaneSharer;
+  LaneCarrier() = default;
+
+  const lanes::Interface* interface_ = nullptr;
+  lanes::Carrier carrier_ = {};
+  std::vector<lanes::Contact> contacts_;
+  std::vector<bool> is_aligned_;
+};
+
+/// How contacts share what a motion needs, as long as no inequality is active.
+class LaneSharer {
+ public:
   /// @param ground_height           for the centre of pressure on flat ground [m]
   /// @param flat_horizontal_ground  as AnalysisSettings::flat_horizontal_ground
   /// @throws std::bad_alloc
-  LaneAnalysis(const LaneRobot& robot, double ground_height, bool flat_horizontal_ground);
+  LaneSharer(const LaneCarrier& carrier, double ground_height, bool flat_horizontal_ground);
 
-  /// Analyzes some frames of a motion, as far as lanes do.
-  /// @param result  with storage for all frames, and the contacts' active in place
+  /// @param contacts   how they lie
   /// @param readiness  of the contacts, frames × contacts, or nothing; see ContactSchedule
-  void run(const Motion& motion, Eigen::Index first, Eigen::Index frames,
+  /// @param result     with what the motion needs, when contacts are active, and room for the rest
+  void run(Eigen::Index first, Eigen::Index frames, const std::vector<ContactMotion>& contacts,
            const Eigen::MatrixXd& readiness, MotionAnalysis& result);
 
-  /// Finds how the contacts' frames lie and move in some frames of a motion.
-  void place(const Motion& motion, Eigen::Index first, Eigen::Index frames);
-
-  /// Of the last run() or place(), for a frame counted from its first.
-  lanes::Outcome outcome(Eigen::Index frame) const {
-    return outcomes_[static_cast<std::size_t>(frame)];
-  }
-  /// Placement of a contact's frame in the world; after run() where the contact is active.
-  pinocchio::SE3 placement(std::size_t contact, Eigen::Index frame) const;
-  /// After place(): the velocity of its origin, and its angular velocity, in the world's axes.
-  pinocchio::Motion velocity(std::size_t contact, Eigen::Index frame) const;
+  /// Whether a frame of the last run(), counted from its first, has its answer.
+  bool isAnswered(Eigen::Index frame) const { return answered_[frame]; }
 
  private:
-  std::size_t index(std::size_t contact, Eigen::Index frame) const {
-    return static_cast<std::size_t>(frame) * rows_.size() + contact;
-  }
-
   const lanes::Interface& interface_;
-  std::unique_ptr<void, void (*)(void*)> analysis_;
+  std::unique_ptr<void, void (*)(void*)> worker_;
   std::vector<lanes::ContactRows> rows_;
-  std::vector<lanes::Outcome> outcomes_;
-  std::vector<double> placements_, velocities_;
+  const std::vector<bool>& is_aligned_;
+  Eigen::Array<bool, Eigen::Dynamic, 1> answered_;
 };
 
 }  // namespace dynacom::internal

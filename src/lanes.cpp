@@ -71,6 +71,39 @@ inline Matrix rotationOf(const Lanes& x, const Lanes& y, const Lanes& z, const L
           {xz + wy, yz - wx, 1. - (xx + yy)}};
 }
 
+// The quaternion (x, y, z, w), as Eigen has it: by its largest component, or by w where the trace
+// is positive.
+inline void findQuaternion(const Matrix& m, Lanes (&quaternion)[4]) {
+  const Lanes xx = m.x.x, yy = m.y.y, zz = m.z.z;
+  const Lanes trace = xx + yy + zz;
+  // Four times the product of each component with the one that is chosen.
+  Lanes square = 1. + trace;
+  Lanes x = m.y.z - m.z.y, y = m.z.x - m.x.z, z = m.x.y - m.y.x, w = square;
+  const auto choose = [&](const Mask& mask, const Lanes& chosen, const Lanes& with_x,
+                          const Lanes& with_y, const Lanes& with_z, const Lanes& with_w) {
+    stdx::where(mask, square) = chosen;
+    stdx::where(mask, x) = with_x;
+    stdx::where(mask, y) = with_y;
+    stdx::where(mask, z) = with_z;
+    stdx::where(mask, w) = with_w;
+  };
+  const Lanes xy = m.x.y + m.y.x, xz = m.x.z + m.z.x, yz = m.y.z + m.z.y;
+  const Lanes from_x = x, from_y = y, from_z = z;
+  const Mask other = !(trace > 0.);
+  const Mask by_y = other && yy > xx && yy >= zz, by_z = other && zz > xx && zz > yy;
+  const Mask by_x = other && !by_y && !by_z;
+  const Lanes square_x = 1. + xx - yy - zz, square_y = 1. + yy - zz - xx,
+              square_z = 1. + zz - xx - yy;
+  choose(by_x, square_x, square_x, xy, xz, from_x);
+  choose(by_y, square_y, xy, square_y, yz, from_y);
+  choose(by_z, square_z, xz, yz, square_z, from_z);
+  const Lanes scale = 0.5 / stdx::sqrt(square);
+  quaternion[0] = scale * x;
+  quaternion[1] = scale * y;
+  quaternion[2] = scale * z;
+  quaternion[3] = scale * w;
+}
+
 // How a joint's frame moves, in the world's axes: velocity and acceleration are those of its origin
 // as a point.
 struct Moving {
@@ -109,61 +142,93 @@ struct Factors {
   }
 };
 
-class Analysis {
+// The frames at hand: as many as there are lanes, or those that are left.
+class Block {
+ protected:
+  void take(std::ptrdiff_t first, std::ptrdiff_t count) {
+    first_ = first;
+    count_ = static_cast<int>(std::min<std::ptrdiff_t>(kLanes, count - first));
+  }
+  // Lanes that are too many do what the last one does.
+  std::ptrdiff_t frameOf(int lane) const { return first_ + std::min(lane, count_ - 1); }
+
+  // Reads columns.
+  template <int kRows>
+  void load(const double* columns, Lanes (&values)[kRows]) const {
+    for (int row = 0; row < kRows; ++row)
+      values[row] = Lanes([&](auto lane) { return columns[frameOf(lane) * kRows + row]; });
+  }
+  Vector loadVector(const double* columns) const {
+    Lanes values[3];
+    load(columns, values);
+    return {values[0], values[1], values[2]};
+  }
+
+  template <int kRows>
+  void store(double* columns, const Lanes (&values)[kRows]) const {
+    double buffer[kRows][kLanes];
+    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
+    double* column = columns + first_ * kRows;
+    for (int lane = 0; lane < count_; ++lane, column += kRows)
+      for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
+  }
+  void store(double* columns, const Vector& values) const {
+    store(columns, {values.x, values.y, values.z});
+  }
+  // The same, where something is so.
+  template <int kRows>
+  void storeWhere(const Mask& mask, double* columns, const Lanes (&values)[kRows]) const {
+    double buffer[kRows][kLanes];
+    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
+    double* column = columns + first_ * kRows;
+    for (int lane = 0; lane < count_; ++lane, column += kRows)
+      if (mask[lane])
+        for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
+  }
+  void store(bool* values, const Mask& mask) const {
+    for (int lane = 0; lane < count_; ++lane) values[first_ + lane] = mask[lane];
+  }
+
+  std::ptrdiff_t first_ = 0;
+  int count_ = 0;
+};
+
+// ---- What a motion needs, and how its contacts lie and move ----
+
+class Sweeper : Block {
  public:
-  explicit Analysis(const Robot& robot)
+  explicit Sweeper(const Robot& robot)
       : robot_(robot),
         joints_(robot.joint, robot.joint + robot.joints),
         contacts_(robot.contact, robot.contact + robot.contacts),
         carries_(joints_.size()),
-        moving_(joints_.size()),
-        standing_(contacts_.size()) {
+        moving_(joints_.size()) {
     mass_ = 0.;
     for (const Joint& joint : joints_) mass_ += joint.mass;
-    for (const Contact& contact : contacts_)
+    for (const Fixture& contact : contacts_)
       for (int joint = contact.parent; joint >= 0; joint = joints_[std::size_t(joint)].parent)
         carries_[std::size_t(joint)] = true;
   }
 
-  void run(const Frames& frames) {
-    for (first_ = 0; first_ < frames.count; first_ += kLanes) {
-      take(frames.count, frames.q, frames.v, frames.a);
-      computeDynamics(frames);
-      distribute(frames);
-    }
-  }
-
-  void place(const Places& places) {
-    for (first_ = 0; first_ < places.count; first_ += kLanes) {
-      take(places.count, places.q, places.v, places.v);  // nobody asks for accelerations
+  void run(const Sweep& sweep) {
+    for (std::ptrdiff_t first = 0; first < sweep.count; first += kLanes) {
+      take(first, sweep.count);
+      takeMotion(sweep);
       for (std::size_t k = 0; k < joints_.size(); ++k)
-        if (carries_[k]) moving_[k] = move(joints_[k]);
-      for (std::size_t k = 0; k < contacts_.size(); ++k) placeContact(places, k);
-      const Mask known = normalized_ && nothing_ == 0.;
-      for (int lane = 0; lane < count_; ++lane)
-        places.outcomes[first_ + lane] = known[lane] ? Outcome::Dynamics : Outcome::Nothing;
+        if (sweep.a || carries_[k]) moving_[k] = move(joints_[k]);
+      if (sweep.a) computeDynamics(sweep);
+      for (std::size_t k = 0; k < contacts_.size(); ++k) place(contacts_[k], sweep.contacts[k]);
+      store(sweep.known, normalized_ && nothing_ == 0.);
     }
   }
 
  private:
-  // A contact as it stands in the frames at hand.
-  struct Standing {
-    Lanes is_active;  // its readiness, or 0
-    bool takes_part;  // in any frame
-    Matrix rotation;  // of its surface
-    Vector lever;     // from the CoM to the surface's origin
-    Vector moments[3];
-    Lanes force[6];
-  };
-
-  // The frames at hand, from the first on.
-  void take(std::ptrdiff_t count, const double* q, const double* v, const double* a) {
-    count_ = static_cast<int>(std::min<std::ptrdiff_t>(kLanes, count - first_));
-    for (int lane = 0; lane < kLanes; ++lane) {  // those too many do what the last one does
-      const std::ptrdiff_t frame = first_ + std::min(lane, count_ - 1);
-      q_[lane] = q + frame * robot_.nq;
-      v_[lane] = v + frame * robot_.nv;
-      a_[lane] = a + frame * robot_.nv;
+  void takeMotion(const Sweep& sweep) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const std::ptrdiff_t frame = frameOf(lane);
+      q_[lane] = sweep.q + frame * robot_.nq;
+      v_[lane] = sweep.v + frame * robot_.nv;
+      a_[lane] = (sweep.a ? sweep.a : sweep.v) + frame * robot_.nv;
     }
     nothing_ = 0.;
     normalized_ = Mask(true);
@@ -189,63 +254,28 @@ class Analysis {
     return rotationOf(x, y, z, w);
   }
 
-  template <int kRows>
-  void store(double* columns, int rows, int first_row, const Lanes (&values)[kRows]) const {
-    double buffer[kRows][kLanes];
-    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
-    double* column = columns + first_ * rows + first_row;
-    for (int lane = 0; lane < count_; ++lane, column += rows)
-      for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
-  }
-  void store(double* columns, const Vector& values) const {
-    store(columns, 3, 0, {values.x, values.y, values.z});
-  }
-  void storePlacement(double* placements, std::size_t k, const Matrix& R, const Vector& p) const {
-    store(placements, 12 * robot_.contacts, 12 * static_cast<int>(k),
-          {R.x.x, R.x.y, R.x.z, R.y.x, R.y.y, R.y.z, R.z.x, R.z.y, R.z.z, p.x, p.y, p.z});
-  }
-  // The same, where something is so.
-  template <int kRows>
-  void storeWhere(const Mask& mask, double* columns, const Lanes (&values)[kRows]) const {
-    double buffer[kRows][kLanes];
-    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
-    double* column = columns + first_ * kRows;
-    for (int lane = 0; lane < count_; ++lane, column += kRows)
-      if (mask[lane])
-        for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
-  }
-
   Moving move(const Joint& joint);
   void addBody(const Joint& joint, const Moving& moving);
-  void computeDynamics(const Frames& frames);
-  void placeContact(const Places& places, std::size_t k) const;
-  void place(const Frames& frames);
-  Mask findForces();
-  void distribute(const Frames& frames);
-  void storeContact(const Frames& frames, std::size_t k, const Mask& answered) const;
+  void computeDynamics(const Sweep& sweep);
+  void place(const Fixture& contact, const PlaceRows& rows) const;
 
   const Robot robot_;
   const std::vector<Joint> joints_;
-  const std::vector<Contact> contacts_;
+  const std::vector<Fixture> contacts_;
   double mass_;
-  std::vector<bool> carries_;       // which joints have contacts beyond them
-  std::vector<Moving> moving_;      // by joint
-  std::vector<Standing> standing_;  // by contact
+  std::vector<bool> carries_;   // which joints have contacts beyond them
+  std::vector<Moving> moving_;  // by joint
 
   // Of the frames at hand.
-  std::ptrdiff_t first_ = 0;
-  int count_ = 0;
   const double *q_[kLanes], *v_[kLanes], *a_[kLanes];
   Lanes nothing_;    // zero, if all numbers are finite
   Mask normalized_;  // all quaternions, and no angle is huge
   // Sums over the bodies, about the first joint: mass times place, velocity, acceleration; angular
   // momentum and its rate.
   Vector centre_, places_, momentum_, momentum_rate_, angular_momentum_, angular_momentum_rate_;
-  Vector com_, force_, torque_;
-  Lanes wrench_[6], achieved_[6];
 };
 
-Moving Analysis::move(const Joint& joint) {
+Moving Sweeper::move(const Joint& joint) {
   Moving at;  // the joint, before it moves
   Vector arm;
   const Vector offset = broadcast(joint.placement + 9);
@@ -359,7 +389,7 @@ Moving Analysis::move(const Joint& joint) {
   return at;
 }
 
-void Analysis::addBody(const Joint& joint, const Moving& moving) {
+void Sweeper::addBody(const Joint& joint, const Moving& moving) {
   if (joint.massless) return;
   const Vector arm = moving.rotation * broadcast(joint.com);
   const Vector around = cross(moving.angular_velocity, arm);
@@ -386,83 +416,145 @@ void Analysis::addBody(const Joint& joint, const Moving& moving) {
   angular_momentum_rate_ += moving.rotation * own_rate + cross(place, momentum_rate);
 }
 
-// Newton and Euler (1, 2), and the centre of pressure (5).
-void Analysis::computeDynamics(const Frames& frames) {
+// Newton and Euler (1, 2).
+void Sweeper::computeDynamics(const Sweep& sweep) {
   places_ = momentum_ = momentum_rate_ = angular_momentum_ = angular_momentum_rate_ = zero();
-  for (std::size_t k = 0; k < joints_.size(); ++k) {
-    moving_[k] = move(joints_[k]);
-    if (k == 0) centre_ = moving_[0].position;
-    addBody(joints_[k], moving_[k]);
-  }
+  centre_ = moving_[0].position;
+  for (std::size_t k = 0; k < joints_.size(); ++k) addBody(joints_[k], moving_[k]);
   const Lanes inverse_mass = 1. / mass_;
   const Vector place = inverse_mass * places_;
-  const Vector acom = inverse_mass * momentum_rate_;
+  const Vector com = centre_ + place;
   const Vector am = angular_momentum_ - cross(place, momentum_);
-  com_ = centre_ + place;
-  force_ = momentum_rate_ - Lanes(mass_) * broadcast(robot_.gravity);
-  torque_ = angular_momentum_rate_ - cross(place, momentum_rate_);
-  store(frames.com, com_);
-  store(frames.vcom, inverse_mass * momentum_);
-  store(frames.acom, acom);
-  store(frames.am, am);
-  store(frames.dam, torque_);
-  store(frames.force, force_);
-  store(frames.torque, torque_);
-  for (const Vector& vector : {com_, momentum_, am, force_, torque_})
+  const Vector force = momentum_rate_ - Lanes(mass_) * broadcast(robot_.gravity);
+  const Vector torque = angular_momentum_rate_ - cross(place, momentum_rate_);
+  store(sweep.com, com);
+  store(sweep.vcom, inverse_mass * momentum_);
+  store(sweep.acom, inverse_mass * momentum_rate_);
+  store(sweep.am, am);
+  store(sweep.dam, torque);
+  store(sweep.force, force);
+  store(sweep.torque, torque);
+  for (const Vector& vector : {com, momentum_, am, force, torque})
     nothing_ += 0. * (vector.x + vector.y + vector.z);
-
-  if (!robot_.flat_horizontal_ground) return;
-  const Lanes height = com_.z - robot_.ground_height;
-  Lanes x = com_.x + (-torque_.y - force_.x * height) / force_.z;
-  Lanes y = com_.y + (torque_.x - force_.y * height) / force_.z;
-  const Mask undefined = !(force_.z >= robot_.minimal_vertical_force) || !(0. * (x + y) == 0.);
-  stdx::where(undefined, x) = kNaN;
-  stdx::where(undefined, y) = kNaN;
-  store(frames.cop, 2, 0, {x, y});
 }
 
-void Analysis::placeContact(const Places& places, std::size_t k) const {
-  const Contact& contact = contacts_[k];
+void Sweeper::place(const Fixture& contact, const PlaceRows& rows) const {
   const Moving& parent = moving_[static_cast<std::size_t>(contact.parent)];
   const Vector arm = parent.rotation * broadcast(contact.placement + 9);
-  storePlacement(places.placements, k, parent.rotation * broadcastMatrix(contact.placement),
-                 parent.position + arm);
-  const Vector& spin = parent.angular_velocity;
-  const Vector velocity = parent.velocity + cross(spin, arm);
-  store(places.velocities, 6 * robot_.contacts, 6 * static_cast<int>(k),
-        {velocity.x, velocity.y, velocity.z, spin.x, spin.y, spin.z});
+  const Matrix rotation =
+      contact.world_aligned ? identity() : parent.rotation * broadcastMatrix(contact.placement);
+  // From the frame's origin to that of the surface, and on to its lowest corner.
+  const Vector down = Lanes(-contact.radius) * rotation.z;
+  const Vector position = parent.position + arm + down;
+  const auto lower = [](double half_size, const Lanes& height) {
+    Lanes size = half_size;
+    stdx::where(height > 0., size) = -half_size;
+    return size;
+  };
+  const Vector to_corner = lower(contact.half_length, rotation.x.z) * rotation.x +
+                           lower(contact.half_width, rotation.y.z) * rotation.y;
+  store(rows.position, position);
+  store(rows.height, {position.z + to_corner.z});
+  store(rows.velocity, parent.velocity + cross(parent.angular_velocity, arm + down + to_corner));
+  if (!rows.rotation) return;
+  Lanes quaternion[4];
+  findQuaternion(rotation, quaternion);
+  store(rows.rotation, quaternion);
 }
 
-void Analysis::place(const Frames& frames) {
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    const Contact& contact = contacts_[k];
-    Standing& standing = standing_[k];
-    const bool* active = frames.contacts[k].active + first_;
-    const double* readiness = frames.contacts[k].readiness;
-    standing.is_active = Lanes([&](auto lane) {
-      const int frame = std::min<int>(lane, count_ - 1);
-      if (!active[frame]) return 0.;
-      return readiness ? readiness[first_ + frame] : 1.;
-    });
-    standing.takes_part = stdx::any_of(standing.is_active > 0.);
-    if (!standing.takes_part) continue;
-    const Moving& parent = moving_[static_cast<std::size_t>(contact.parent)];
-    standing.rotation = parent.rotation * broadcastMatrix(contact.placement);
-    Vector origin = parent.position + parent.rotation * broadcast(contact.placement + 9);
-    storePlacement(frames.placements, k, standing.rotation, origin);
-    if (contact.world_aligned) standing.rotation = identity();
-    origin = origin - Lanes(contact.radius) * standing.rotation.z;
-    standing.lever = origin - com_;
-    standing.moments[0] = cross(standing.lever, standing.rotation.x);
-    standing.moments[1] = cross(standing.lever, standing.rotation.y);
-    standing.moments[2] = cross(standing.lever, standing.rotation.z);
+// ---- How contacts share a wrench ----
+
+class Sharer : Block {
+ public:
+  explicit Sharer(const Carrier& carrier)
+      : carrier_(carrier),
+        contacts_(carrier.contact, carrier.contact + carrier.contacts),
+        standing_(contacts_.size()) {}
+
+  void run(const Shares& shares) {
+    for (std::ptrdiff_t first = 0; first < shares.count; first += kLanes) {
+      take(first, shares.count);
+      com_ = loadVector(shares.com);
+      force_ = loadVector(shares.force);
+      torque_ = loadVector(shares.torque);
+      const Lanes wrench[6] = {force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z};
+      for (int i = 0; i < 6; ++i) wrench_[i] = wrench[i];
+      bool any = false;
+      for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        stand(shares.contacts[k], standing_[k]);
+        any = any || standing_[k].takes_part;
+      }
+      if (carrier_.flat_horizontal_ground) findCentreOfPressure(shares);
+      if (any)
+        distribute(shares);
+      else
+        store(shares.answered, Mask(false));
+    }
   }
+
+ private:
+  // A contact as it stands in the frames at hand.
+  struct Standing {
+    Lanes is_active;  // its readiness, or 0
+    bool takes_part;  // in any frame
+    Matrix rotation;  // of its surface
+    Vector lever;     // from the CoM to the surface's origin
+    Vector moments[3];
+    Lanes force[6];
+  };
+
+  void stand(const ContactRows& rows, Standing& standing) const;
+  void findCentreOfPressure(const Shares& shares) const;
+  Mask findForces();
+  void distribute(const Shares& shares);
+  void storeContact(const Shares& shares, std::size_t k, const Mask& answered) const;
+
+  const Carrier carrier_;
+  const std::vector<Contact> contacts_;
+  std::vector<Standing> standing_;  // by contact
+
+  // Of the frames at hand.
+  Vector com_, force_, torque_;
+  Lanes wrench_[6], achieved_[6];
+};
+
+void Sharer::stand(const ContactRows& rows, Standing& standing) const {
+  bool any = false;
+  for (int lane = 0; lane < count_; ++lane) any = any || rows.active[first_ + lane];
+  standing.takes_part = any;
+  if (!any) return;
+  standing.is_active = Lanes([&](auto lane) {
+    const std::ptrdiff_t frame = frameOf(lane);
+    if (!rows.active[frame]) return 0.;
+    return rows.readiness ? rows.readiness[frame] : 1.;
+  });
+  standing.rotation = identity();
+  if (rows.rotation) {
+    Lanes quaternion[4];
+    load(rows.rotation, quaternion);
+    standing.rotation = rotationOf(quaternion[0], quaternion[1], quaternion[2], quaternion[3]);
+  }
+  standing.lever = loadVector(rows.position) - com_;
+  standing.moments[0] = cross(standing.lever, standing.rotation.x);
+  standing.moments[1] = cross(standing.lever, standing.rotation.y);
+  standing.moments[2] = cross(standing.lever, standing.rotation.z);
+}
+
+// The centre of pressure (5).
+void Sharer::findCentreOfPressure(const Shares& shares) const {
+  const Lanes height = com_.z - carrier_.ground_height;
+  Lanes x = com_.x + (-torque_.y - force_.x * height) / force_.z;
+  Lanes y = com_.y + (torque_.x - force_.y * height) / force_.z;
+  const Mask undefined = !(force_.z >= carrier_.minimal_vertical_force) || !(0. * (x + y) == 0.);
+  stdx::where(undefined, x) = kNaN;
+  stdx::where(undefined, y) = kNaN;
+  store(shares.cop, {x, y});
 }
 
 // The cheapest forces that give the wrench, whatever inequalities say: the multipliers ν solve
 // NE W⁻² NEᵀ ν = w, and λ = W⁻² NEᵀ ν. Says where all inequalities hold.
-Mask Analysis::findForces() {
-  const double* D = robot_.wrench_weights;
+Mask Sharer::findForces() {
+  const double* D = carrier_.wrench_weights;
   Factors factors;
   Lanes compliance[6][6];
   for (auto& row : compliance)
@@ -551,29 +643,21 @@ Mask Analysis::findForces() {
   return answered && distance <= kMissing * kMissing * size;
 }
 
-void Analysis::distribute(const Frames& frames) {
-  const Lanes wrench[6] = {force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z};
-  for (int i = 0; i < 6; ++i) wrench_[i] = wrench[i];
-  place(frames);
-  const Mask known = normalized_ && nothing_ == 0.;
-  const Mask answered = known && findForces();
-  for (int lane = 0; lane < count_; ++lane)
-    frames.outcomes[first_ + lane] = answered[lane] ? Outcome::Everything
-                                     : known[lane]  ? Outcome::Dynamics
-                                                    : Outcome::Nothing;
-
-  const Lanes inverse_mass = 1. / mass_;
+void Sharer::distribute(const Shares& shares) {
+  const Mask answered = findForces();
+  store(shares.answered, answered);
+  const Lanes inverse_mass = 1. / carrier_.mass;
   const Vector acom =
-      inverse_mass * Vector{achieved_[0], achieved_[1], achieved_[2]} + broadcast(robot_.gravity);
-  store(frames.feasible_acom, acom);
-  store(frames.feasible_dam, Vector{achieved_[3], achieved_[4], achieved_[5]});
+      inverse_mass * Vector{achieved_[0], achieved_[1], achieved_[2]} + broadcast(carrier_.gravity);
+  store(shares.feasible_acom, acom);
+  store(shares.feasible_dam, Vector{achieved_[3], achieved_[4], achieved_[5]});
   Lanes residual[6];
   for (int i = 0; i < 6; ++i) residual[i] = wrench_[i] - achieved_[i];
-  store(frames.residual, 6, 0, residual);
+  store(shares.residual, residual);
   for (std::size_t k = 0; k < contacts_.size(); ++k)
-    if (standing_[k].takes_part) storeContact(frames, k, answered);
+    if (standing_[k].takes_part) storeContact(shares, k, answered);
 
-  if (robot_.flat_horizontal_ground) return;
+  if (carrier_.flat_horizontal_ground) return;
   // The mean of the contacts' own centres of pressure, weighted by their vertical forces (6).
   Vector moment = zero();
   Lanes vertical_force = 0.;
@@ -591,21 +675,21 @@ void Analysis::distribute(const Frames& frames) {
   }
   Lanes x = moment.x / vertical_force, y = moment.y / vertical_force;
   const Mask undefined =
-      !(vertical_force >= robot_.minimal_vertical_force) || !(0. * (x + y) == 0.);
+      !(vertical_force >= carrier_.minimal_vertical_force) || !(0. * (x + y) == 0.);
   stdx::where(undefined, x) = kNaN;
   stdx::where(undefined, y) = kNaN;
-  store(frames.cop, 2, 0, {x, y});
+  store(shares.cop, {x, y});
 }
 
 // As ContactBase and DynaCoM have it.
-void Analysis::storeContact(const Frames& frames, std::size_t k, const Mask& answered) const {
+void Sharer::storeContact(const Shares& shares, std::size_t k, const Mask& answered) const {
   const Contact& contact = contacts_[k];
   const Standing& standing = standing_[k];
-  const ContactRows& rows = frames.contacts[k];
+  const ContactRows& rows = shares.contacts[k];
   const Lanes* f = standing.force;
   const Matrix& R = standing.rotation;
   const Mask written = answered && standing.is_active > 0.;
-  const Mask unloaded = f[2] < robot_.minimal_vertical_force;
+  const Mask unloaded = f[2] < carrier_.minimal_vertical_force;
   const Lanes inverse = 1. / f[2];
   const bool is_surface = contact.size == 6;
 
@@ -630,23 +714,32 @@ void Analysis::storeContact(const Frames& frames, std::size_t k, const Mask& ans
                 {usage(stdx::abs(f[5]), is_surface ? contact.betas[5] : 0.)});
 }
 
-void* create(const Robot* robot) {
+// What crosses to the library and back.
+template <class Worker, class Description>
+void* create(const Description* description) {
   try {
-    return new Analysis(*robot);
+    return new Worker(*description);
   } catch (const std::bad_alloc&) {
     return nullptr;
   }
 }
-
-void run(void* analysis, const Frames* frames) { static_cast<Analysis*>(analysis)->run(*frames); }
-
-void place(void* analysis, const Places* places) {
-  static_cast<Analysis*>(analysis)->place(*places);
+template <class Worker, class Frames>
+void run(void* worker, const Frames* frames) {
+  static_cast<Worker*>(worker)->run(*frames);
+}
+template <class Worker>
+void destroy(void* worker) {
+  delete static_cast<Worker*>(worker);
 }
 
-void destroy(void* analysis) { delete static_cast<Analysis*>(analysis); }
-
-constexpr Interface kInterface = {kVersion, kLanes, &create, &run, &place, &destroy};
+constexpr Interface kInterface = {kVersion,
+                                  kLanes,
+                                  &create<Sweeper, Robot>,
+                                  &run<Sweeper, Sweep>,
+                                  &destroy<Sweeper>,
+                                  &create<Sharer, Carrier>,
+                                  &run<Sharer, Shares>,
+                                  &destroy<Sharer>};
 
 }  // namespace
 }  // namespace dynacom::lanes

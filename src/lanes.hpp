@@ -3,10 +3,11 @@
 
 #include <cstddef>
 
-// What crosses between the library and its lanes: the per-frame mathematics of analyzeMotion() for
-// several frames at once, one in each lane of a SIMD register. lanes.cpp is compiled once for each
-// width that registers may have, each time with flags of its own, into a shared object of its own:
-// hence plain arrays, and nothing of Eigen, Pinocchio or the standard library.
+// What crosses between the library and its lanes: the per-frame mathematics of analyzeMotion(), in
+// its two steps, for several frames at once, one in each lane of a SIMD register. lanes.cpp is
+// compiled once for each width that registers may have, each time with flags of its own, into a
+// shared object of its own: hence plain arrays, and nothing of Eigen, Pinocchio or the standard
+// library.
 //
 // Placements are twelve numbers: the rotation, column by column, and the translation.
 
@@ -34,77 +35,94 @@ struct Joint {
   double inertia[6];  // about the CoM, in the joint's axes: xx, xy, yy, xz, yz, zz
 };
 
-/// A contact whose forces are limited by |λᵢ| ≤ βᵢ λ_z.
-struct Contact {
-  int size;              // 3 or 6 components
+/// A contact as a body: where it is fixed, and what of it may touch the ground.
+struct Fixture {
   int parent;            // joint
   double placement[12];  // of its frame in the parent joint's
   bool world_aligned;
-  double radius;
-  double betas[6];    // the third is not used
-  double weights[6];  // of the cost
+  double radius;                   // of a sphere
+  double half_length, half_width;  // of a rectangle
 };
 
 struct Robot {
   int nq, nv, joints, contacts;
   const Joint* joint;
+  const Fixture* contact;
+  double gravity[3];
+};
+
+/// Where it goes how a contact lies and moves; see ContactMotion.
+struct PlaceRows {
+  double *position, *height, *velocity;
+  double* rotation;  // null where it is not to be written
+};
+
+/// Where a motion's frames are, one behind the other, and where it goes what they are; see
+/// MotionAnalysis.
+struct Sweep {
+  std::ptrdiff_t count;
+  const double *q, *v;
+  const double* a;  // null where nothing but places is asked for: then all of the next is
+  double *com, *vcom, *acom, *am, *dam, *force, *torque;
+  const PlaceRows* contacts;
+  bool* known;  // false where numbers are not finite, quaternions not of norm 1, or angles huge:
+                // what was written there is nothing
+};
+
+/// A contact as a force, whose components are limited by |λᵢ| ≤ βᵢ λ_z.
+struct Contact {
+  int size;           // 3 or 6 components
+  double betas[6];    // the third is not used
+  double weights[6];  // of the cost
+};
+
+/// What shares a wrench.
+struct Carrier {
+  int contacts;
   const Contact* contact;
+  double mass;
   double gravity[3];
   double wrench_weights[6];
   double ground_height, minimal_vertical_force;
   bool flat_horizontal_ground;
 };
 
-/// Which part of a frame's results is there.
-enum class Outcome : unsigned char {
-  Everything,  // no inequality is active
-  Dynamics,    // all but distribution and contacts
-  Nothing,     // numbers are not finite, quaternions not of norm 1, or angles huge
-};
-
-/// Where results of a contact go; see MotionAnalysis::Contact. Written where it is active and the
-/// outcome is Everything.
+/// When a contact is active, where its surface is, and where results go; see
+/// MotionAnalysis::Contact. These are written where it is active and there is an answer.
 struct ContactRows {
   const bool* active;
   const double* readiness;  // see ContactSchedule; null for 1
+  const double* position;
+  const double* rotation;  // null for the world's axes
   double *wrench, *vertical_force, *cop, *friction_usage, *yaw_usage, *cop_margin;
 };
 
-/// Where frames are, one behind the other, and where results go; see MotionAnalysis. What the
-/// outcome says is not there may have been written all the same.
-struct Frames {
+/// Wrenches about CoMs, one behind the other, and where it goes how contacts share them; see
+/// MotionAnalysis. What is not answered may have been written all the same.
+struct Shares {
   std::ptrdiff_t count;
-  const double *q, *v, *a;
-  double *com, *vcom, *acom, *am, *dam, *force, *torque;
+  const double *com, *force, *torque;
   double* cop;
   double *feasible_acom, *feasible_dam, *residual;
   const ContactRows* contacts;
-  double* placements;  // of the contacts' frames in the world: 12 × contacts × frames
-  Outcome* outcomes;
-};
-
-/// Where frames are, and where it goes how the contacts' frames lie and move in them.
-struct Places {
-  std::ptrdiff_t count;
-  const double *q, *v;
-  double* placements;  // in the world: 12 × contacts × frames
-  double* velocities;  // linear, of the frame's origin, and angular, in the world: 6 × contacts ×
-                       // frames
-  Outcome* outcomes;   // Dynamics, or Nothing
+  bool* answered;  // whether no inequality is active
 };
 
 /// What each shared object gives by the function "dynacom_lanes".
 struct Interface {
   int version;  // of what stands here
   int lanes;
-  /// Makes what the others take; the robot is copied. Null where there is no memory.
-  void* (*create)(const Robot* robot);
-  void (*run)(void* analysis, const Frames* frames);
-  void (*place)(void* analysis, const Places* places);
-  void (*destroy)(void* analysis);
+  /// Makes what the next takes; the robot is copied. Null where there is no memory.
+  void* (*create_sweeper)(const Robot* robot);
+  void (*sweep)(void* sweeper, const Sweep* sweep);
+  void (*destroy_sweeper)(void* sweeper);
+  /// The same for a carrier.
+  void* (*create_sharer)(const Carrier* carrier);
+  void (*share)(void* sharer, const Shares* shares);
+  void (*destroy_sharer)(void* sharer);
 };
 
-constexpr int kVersion = 3;  // grows with each change to this file
+constexpr int kVersion = 4;  // grows with each change to this file
 constexpr char kEntry[] = "dynacom_lanes";
 using Entry = const Interface* (*)();
 

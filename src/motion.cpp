@@ -23,6 +23,36 @@ namespace {
 // What mismatches of derivatives are a part of at least: [m/s, rad/s], [m/s², rad/s²].
 constexpr double kLeastVelocity = 0.05, kLeastAcceleration = 0.5;
 
+// Rotation vectors and quaternions, as pinocchio::quaternion::log3() and exp3(): by their series
+// where angles are small, as they are from frame to frame, since trigonometry takes most of the
+// time that there is to it. Of squares below this, the terms left out are less than rounding.
+constexpr double kSmallSquare = 0.01;
+
+Eigen::Vector3d logarithm(const Eigen::Quaterniond& rotation) {
+  const double t2 = rotation.vec().squaredNorm() / (rotation.w() * rotation.w());  // tan²(θ/2)
+  if (!(rotation.w() > 0.) || !(t2 < kSmallSquare)) return pinocchio::quaternion::log3(rotation);
+  double series = 0.;  // arctan(t) / t
+  for (int k = 7; k >= 0; --k) series = 1. / (2 * k + 1) - t2 * series;
+  return (2. * series / rotation.w()) * rotation.vec();
+}
+
+Eigen::Quaterniond exponential(const Eigen::Vector3d& rotation) {
+  const double x2 = 0.25 * rotation.squaredNorm();  // (θ/2)²
+  Eigen::Quaterniond exponential;
+  if (!(x2 < kSmallSquare)) {
+    pinocchio::quaternion::exp3(rotation, exponential);
+    return exponential;
+  }
+  double sine = 1., cosine = 1.;  // sin(x) / x, and cos(x)
+  for (int k = 6; k >= 1; --k) {
+    sine = 1. - x2 * (1. / (2 * k * (2 * k + 1))) * sine;
+    cosine = 1. - x2 * (1. / (2 * k * (2 * k - 1))) * cosine;
+  }
+  exponential.vec() = 0.5 * sine * rotation;
+  exponential.w() = cosine;
+  return exponential;
+}
+
 // Components of configurations, by how they move.
 
 // Numbers, each on its own: joints, and places in the world.
@@ -48,18 +78,14 @@ struct Rotations {
   Eigen::Index size() const { return 3 * count(); }
   void difference(const Eigen::VectorXd& from, const Eigen::VectorXd& to,
                   Eigen::VectorXd& step) const {
-    for (Eigen::Index k = 0; k < count(); ++k) {
-      const Eigen::Quaterniond turned = read(from, k).conjugate() * read(to, k);
-      step.segment<3>(3 * k) = pinocchio::quaternion::log3(turned);
-    }
+    for (Eigen::Index k = 0; k < count(); ++k)
+      step.segment<3>(3 * k) = logarithm(read(from, k).conjugate() * read(to, k));
   }
   void integrate(const Eigen::VectorXd& from, const Eigen::VectorXd& step,
                  Eigen::VectorXd& to) const {
-    Eigen::Quaterniond turned;
-    for (Eigen::Index k = 0; k < count(); ++k) {
-      pinocchio::quaternion::exp3(step.segment<3>(3 * k), turned);
-      to.segment<4>(4 * k) = (read(from, k) * turned).normalized().coeffs();
-    }
+    for (Eigen::Index k = 0; k < count(); ++k)
+      to.segment<4>(4 * k) =
+          (read(from, k) * exponential(step.segment<3>(3 * k))).normalized().coeffs();
   }
 
  private:

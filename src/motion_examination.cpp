@@ -4,14 +4,21 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <iterator>
 #include <mutex>
 #include <utility>
 
 #include "body_screening.hpp"
 #include "check.hpp"
-#include "motion_steps.hpp"
+#include "contact_split.hpp"
+#include "inference/contact_inference.hpp"
+#include "motion_derivation.hpp"
+#include "motion_distribution.hpp"
+#include "motion_judgement.hpp"
+#include "motion_sweep.hpp"
 #include "nan.hpp"
 #include "seat_search.hpp"
+#include "support_meter.hpp"
 
 namespace dynacom {
 
@@ -24,6 +31,9 @@ void ExaminationSettings::validate() const {
 }
 
 namespace {
+
+using internal::ContactSplit;
+using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 
 // Velocities as the ground sees them, which may be a treadmill.
 void makeRelative(const Eigen::Vector3d& ground_velocity, std::vector<ContactMotion>& motions) {
@@ -86,11 +96,10 @@ Eigen::MatrixXd findRecordedConfidence(const std::vector<std::string>& names,
 // Frames whose accelerations a filter has smeared: those around the beginning and the end of a
 // flight, where the force jumps, by half a period of the cut-off.
 void addSmeared(const ContactSchedule& schedule, const Eigen::VectorXd& time, double cutoff,
-                Eigen::Array<bool, Eigen::Dynamic, 1>& unsure) {
+                Mask& unsure) {
   if (!(cutoff > 0.)) return;
   const double width = 0.5 / cutoff;
   const Eigen::Index frames = time.size();
-  if (unsure.size() == 0) unsure.setConstant(frames, false);
   for (Eigen::Index frame = 1; frame < frames; ++frame) {
     if (schedule.active.col(frame).any() == schedule.active.col(frame - 1).any()) continue;
     for (Eigen::Index k = frame; k < frames && time[k] - time[frame] <= width; ++k)
@@ -112,18 +121,46 @@ constexpr double kSeated = 0.1;
 // How many points there may be at most, see inferContacts().
 constexpr std::size_t kMaximalParts = 32;
 
-// The frames in which contacts cannot give what is needed.
-Eigen::Array<bool, Eigen::Dynamic, 1> findMissing(const MotionVerdict& verdict,
-                                                  const VerdictSettings& settings) {
-  Eigen::Array<bool, Eigen::Dynamic, 1> missing =
-      Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(verdict.unsure.size(), false);
-  for (const MotionFault fault : {MotionFault::ResidualForce, MotionFault::ResidualTorque,
-                                  MotionFault::CoPOutside, MotionFault::FlightWithSupportNeeded})
-    missing = missing || verdict[fault].measured.array() > settings[fault].limit;
+// A set whose forces lack less than this gives all that is needed [m g], [m g m].
+constexpr double kGiven = 1e-3;
+constexpr double kStandardGravity = 9.81;
+
+// A motion, what it needs, and how contacts and their parts lie and move in it.
+struct SweptMotion {
+  const Motion* motion;
+  std::vector<ContactMotion> contacts, parts;
+  MotionAnalysis analysis;
+};
+
+// The frames in which parts cannot give what is needed: more is missing there than verdicts allow
+// in a frame. Verdicts distribute forces for that, and have pyramids for cones.
+Mask findMissing(const ContactSplit& split, const SweptMotion& swept,
+                 const ContactInference& inference, const Mask& unsure,
+                 const VerdictSettings& settings) {
+  const double gravity = -split.carrier.gravity.z();
+  const double unit = gravity > 0. ? gravity / kStandardGravity : 1.;
+  const double weight = split.carrier.mass * kStandardGravity;
+  internal::SupportMeter support(split.carrier, swept.parts, swept.analysis);
+  const auto isMissing = [&](Eigen::Index frame) {
+    const double force = unit * inference.missing(0, frame);
+    const double torque = unit * inference.missing(1, frame);
+    const auto active = inference.schedule.active.col(frame);
+    if (!active.any()) return std::max(force, torque) > settings.flight_with_support_needed.limit;
+    if (force > settings.residual_force.limit || torque > settings.residual_torque.limit)
+      return true;
+    if (std::max(force, torque) <= kGiven ||
+        swept.analysis.ground_force(2, frame) < settings.cop_force * weight)
+      return false;
+    const auto isActive = [&](std::size_t part) { return active[Eigen::Index(part)]; };
+    return support.measure(frame, isActive) > settings.cop_outside.limit;
+  };
+  Mask missing = Mask::Constant(unsure.size(), false);
+  for (Eigen::Index frame = 0; frame < missing.size(); ++frame)
+    missing[frame] = !unsure[frame] && isMissing(frame);
   return missing;
 }
 
-bool isMuch(const Eigen::Array<bool, Eigen::Dynamic, 1>& missing) {
+bool isMuch(const Mask& missing) {
   return double(missing.count()) > kMuch * double(missing.size());
 }
 
@@ -158,17 +195,12 @@ void dropIdle(ContactSchedule& bodies, std::vector<MotionAnalysis::Body>& analyz
   analyzed = std::move(kept_analyzed);
 }
 
-// A motion with certain parts of a robot.
-struct Attempt {
-  const PartRobot* parts;
-  internal::Desks* desks;
-  std::vector<ContactMotion> motions;  // relative to the ground
-  ContactInference inference;
-  std::optional<ContactSchedule> inferred;
-  double ground_height;
-  MotionAnalysis analysis;
-  MotionVerdict verdict;
-};
+// The contacts of a robot, and the parts of these.
+std::vector<internal::FixedContact> listAll(const DynaCoM& robot, const ContactSplit& split) {
+  std::vector<internal::FixedContact> all = internal::describeCarrier(robot).contacts;
+  all.insert(all.end(), split.carrier.contacts.begin(), split.carrier.contacts.end());
+  return all;
+}
 
 }  // namespace
 
@@ -176,159 +208,261 @@ struct Attempt {
 struct MotionExaminer::Office {
   Office(const DynaCoM& given, const ExaminationSettings& given_settings)
       : robot(given),
-        parts(splitContacts(robot)),
         settings(given_settings),
-        desks(robot, given_settings.analysis.lanes),
-        part_desks(parts.robot, given_settings.analysis.lanes),
+        names(robot.getKnownContacts()),
+        split(internal::splitCarrier(robot)),
+        data([this] { return std::make_unique<pinocchio::Data>(robot.getModel()); }),
+        com_sweep(robot.getModel(), {}, given_settings.analysis.lanes, data),
+        sweep(robot.getModel(), listAll(robot, split), given_settings.analysis.lanes, data),
+        distribution(split.carrier, given_settings.analysis.lanes),
         workers(given_settings.analysis.threads) {}
 
   MotionExamination examine(const RecordedMotion& recorded,
                             const std::function<void(double)>& progress);
 
   const DynaCoM robot;
-  const PartRobot parts;
   const ExaminationSettings settings;
-  internal::Desks desks, part_desks;
+  const std::vector<std::string> names;  // of contacts
+  const ContactSplit split;              // these, taken apart
+  internal::DataPool data;
+  const internal::MotionSweep com_sweep, sweep;  // of nothing, and of contacts and parts
+  const internal::MotionDistribution distribution;
   internal::Workers workers;
+
+ private:
+  class Case;
+};
+
+// One motion. Its steps stand in the order in which they are taken.
+class MotionExaminer::Office::Case {
+ public:
+  Case(Office& office, const RecordedMotion& recorded, const std::function<void(double)>& progress)
+      : office_(office), recorded_(recorded), settings_(office.settings), progress_(progress) {}
+
+  MotionExamination examine() {
+    MotionExamination found = {};
+    found.derived = internal::deriveMotion(derivation_, recorded_, settings_.cutoff);
+    const std::vector<double> cutoffs = findOtherCutoffs(found.derived);
+    passes_ = 2. + 2. * double(cutoffs.size());
+    if (recorded_.schedule)
+      for (const std::string& name : recorded_.schedule->names) office_.robot.getContact(name);
+    SweptMotion swept = sweep(found.derived.motion);
+    steps_ = internal::measureStepSpeeds(model(), recorded_.time, recorded_.q, settings_.verdict);
+    near_jumps_ = internal::findNearJumps(recorded_.time, steps_, settings_.verdict);
+
+    found.inference = infer(found.derived, swept);
+    if (recorded_.schedule)
+      found.inferred = gather(inferFrom(*split_, found.derived, swept, nullptr).schedule);
+    makeRelative(found.inference.ground_velocity, swept.parts);
+    distribute(found.inference, swept);
+    found.verdict = judge(found.derived, found.inference, swept);
+    found.seats = findSeats(found.inference, swept, found.verdict);
+    write(swept, found);
+    for (const double cutoff : cutoffs) found.sensitivity.push_back(tryCutoff(cutoff, found));
+    return found;
+  }
+
+ private:
+  const pinocchio::Model& model() const { return office_.robot.getModel(); }
+
+  // Tells what part of all passes through the frames is done.
+  std::function<void(Eigen::Index)> tellPass() {
+    if (!progress_) return nullptr;
+    const double before = done_++;
+    const auto frames = double(recorded_.time.size());
+    return [this, before, frames](Eigen::Index done) {
+      progress_((before + double(done) / frames) / passes_);
+    };
+  }
+
+  Eigen::Matrix3Xd findCoM(const Eigen::MatrixXd& q) const {
+    const Eigen::MatrixXd rest = Eigen::MatrixXd::Zero(model().nv, q.cols());
+    const auto frames = double(q.cols());
+    std::vector<ContactMotion> nothing;
+    MotionAnalysis dynamics;
+    office_.com_sweep.run({Eigen::VectorXd::LinSpaced(q.cols(), 1., frames), q, rest, rest},
+                          office_.workers, nothing, &dynamics);
+    return std::move(dynamics.com);
+  }
+
+  std::vector<double> findOtherCutoffs(const DerivedMotion& derived) const {
+    std::vector<double> cutoffs;
+    if (settings_.sensitivity && derived.cutoff > 0.)
+      for (const double cutoff : {0.5 * derived.cutoff, 2. * derived.cutoff})
+        if (cutoff < kMaximalCutoff * derived.frame_rate) cutoffs.push_back(cutoff);
+    return cutoffs;
+  }
+
+  // Links, if there are any in use, come behind the contacts' parts.
+  SweptMotion sweep(const Motion& motion) {
+    SweptMotion swept = {&motion, {}, {}, {}};
+    std::vector<ContactMotion>& all = swept.contacts;
+    office_.sweep.run(motion, office_.workers, all, &swept.analysis, tellPass());
+    const auto parts = all.begin() + std::ptrdiff_t(office_.names.size());
+    swept.parts.assign(std::make_move_iterator(parts), std::make_move_iterator(all.end()));
+    all.erase(parts, all.end());
+    addLinks(swept);
+    return swept;
+  }
+
+  void addLinks(SweptMotion& swept) {
+    if (!link_sweep_) return;
+    std::vector<ContactMotion> links;
+    link_sweep_->run(*swept.motion, office_.workers, links, nullptr);
+    std::move(links.begin(), links.end(), std::back_inserter(swept.parts));
+  }
+
+  ContactInference inferFrom(const ContactSplit& split, const DerivedMotion& derived,
+                             const SweptMotion& swept, const ContactSchedule* recorded) const {
+    const bool exact =
+        derived.cutoff == 0. || (derived.is_automatic && derived.thinned_noise <= kExactNoise);
+    return internal::inferContacts(split, swept.parts, swept.analysis, exact, settings_.detection,
+                                   recorded);
+  }
+
+  // Finds contacts with links, where those without do not suffice and some links are low then, and
+  // takes the links if they help.
+  ContactInference infer(const DerivedMotion& derived, SweptMotion& swept) {
+    const ContactSchedule* recorded = recorded_.schedule ? &*recorded_.schedule : nullptr;
+    ContactInference found = inferFrom(*split_, derived, swept, recorded);
+    const std::size_t count = split_->parts.size();
+    if (settings_.bodies.empty() || count >= kMaximalParts) return found;
+    const auto lacks = [&](const ContactSplit& split, const ContactInference& inference) {
+      return findMissing(split, swept, inference, findUnsure(derived, inference),
+                         settings_.verdict);
+    };
+    const Mask missing = lacks(*split_, found);
+    if (!isMuch(missing)) return found;
+    const std::vector<BodyPoints> bodies = internal::screenBodies(
+        model(), *office_.data.take(), settings_.bodies, *swept.motion, missing, findLevels(found),
+        settings_.detection.body_reach, kMaximalParts - count);
+    if (bodies.empty()) return found;
+
+    links_.emplace(internal::splitCarrier(office_.robot, bodies));
+    const auto& points = links_->carrier.contacts;
+    link_sweep_.emplace(
+        model(),
+        std::vector<internal::FixedContact>(points.begin() + std::ptrdiff_t(count), points.end()),
+        settings_.analysis.lanes, office_.data);
+    addLinks(swept);
+    ContactInference other = inferFrom(*links_, derived, swept, recorded);
+    const Eigen::Index given = missing.count() - lacks(*links_, other).count();
+    if (given > 0 && double(given) >= kLeastGain * double(missing.count())) {
+      split_ = &*links_;
+      return other;
+    }
+    link_sweep_.reset();
+    swept.parts.resize(count);
+    return found;
+  }
+
+  Mask findUnsure(const DerivedMotion& derived, const ContactInference& inference) const {
+    Mask unsure = near_jumps_ || derived.unsure;
+    addSmeared(inference.schedule, derived.motion.time, derived.cutoff, unsure);
+    return unsure;
+  }
+
+  void distribute(const ContactInference& inference, SweptMotion& swept) {
+    const double given = settings_.detection.ground_height;
+    const double ground_height =
+        findMeanGround(inference, std::isnan(given) ? office_.robot.getGroundHeight() : given);
+    const auto run = [&](const internal::MotionDistribution& distribution) {
+      distribution.run(inference.schedule, swept.parts, ground_height, settings_.analysis,
+                       office_.workers, swept.analysis, tellPass());
+    };
+    if (split_ == &office_.split)
+      run(office_.distribution);
+    else
+      run(internal::MotionDistribution(split_->carrier, settings_.analysis.lanes));
+  }
+
+  MotionVerdict judge(const DerivedMotion& derived, const ContactInference& inference,
+                      const SweptMotion& swept) const {
+    return internal::judgeMotion(
+        {split_->carrier, derived.motion.time, steps_, swept.parts, inference.ground,
+         swept.analysis, near_jumps_, findUnsure(derived, inference),
+         internal::isTooShort(derived.motion, recorded_)},
+        settings_.verdict, office_.workers);
+  }
+
+  // Judges the normals of whole contacts, in a verdict about their parts.
+  void judgeNormals(const MotionExamination& found, MotionVerdict& verdict) const {
+    internal::judgeNormals(found.contacts, found.analysis.contacts, found.derived.motion.time,
+                           settings_.verdict, verdict);
+  }
+
+  // Looks for seats where more is missing than who leans lacks.
+  std::vector<Seat> findSeats(const ContactInference& inference, const SweptMotion& swept,
+                              const MotionVerdict& verdict) const {
+    if (settings_.bodies.empty()) return {};
+    const std::vector<double> levels = findLevels(inference);
+    Mask missing = Mask::Constant(swept.motion->frames(), false);
+    for (const MotionFault fault : {MotionFault::ResidualForce, MotionFault::ResidualTorque,
+                                    MotionFault::FlightWithSupportNeeded})
+      missing = missing || verdict[fault].measured.array() > kSeated;
+    if (levels.empty() || !isMuch(missing)) return {};
+    return internal::findSeats(
+        settings_.bodies, *swept.motion,
+        {model(), *office_.data.take(), *split_, swept.parts, inference.schedule, swept.analysis,
+         missing, *std::max_element(levels.begin(), levels.end())},
+        settings_);
+  }
+
+  ContactSchedule gather(const ContactSchedule& schedule) const {
+    return internal::gatherParts(office_.names, *split_, schedule);
+  }
+
+  // Writes what was found of parts as that of contacts.
+  void write(SweptMotion& swept, MotionExamination& found) const {
+    const ContactSchedule& schedule = found.inference.schedule;
+    found.schedule = gather(schedule);
+    if (recorded_.schedule)
+      found.schedule.confidence = findRecordedConfidence(found.schedule.names, *recorded_.schedule);
+    found.bodies = internal::gatherBodies(*split_, schedule);
+    found.parts = split_->parts;
+    found.ground = findGround(swept.contacts, found.parts, swept.parts, found.inference.ground);
+    found.analysis = internal::gatherParts(office_.robot, *split_, swept.contacts, swept.parts,
+                                           std::move(swept.analysis));
+    dropIdle(found.bodies, found.analysis.bodies);
+    found.contacts = std::move(swept.contacts);
+    found.part_motions = std::move(swept.parts);
+    judgeNormals(found, found.verdict);
+    found.statistics =
+        summarizeMotion(office_.robot, found.derived.motion, found.analysis, found.verdict);
+  }
+
+  CutoffSensitivity tryCutoff(double cutoff, const MotionExamination& found) {
+    const DerivedMotion derived = internal::rederiveMotion(derivation_, recorded_, cutoff);
+    SweptMotion swept = sweep(derived.motion);
+    makeRelative(found.inference.ground_velocity, swept.parts);
+    distribute(found.inference, swept);
+    MotionVerdict verdict = judge(derived, found.inference, swept);
+    judgeNormals(found, verdict);
+    MotionStatistics statistics =
+        summarizeMotion(office_.robot, derived.motion,
+                        internal::gatherParts(office_.robot, *split_, swept.contacts, swept.parts,
+                                              std::move(swept.analysis)),
+                        verdict);
+    return {cutoff, std::move(verdict), std::move(statistics)};
+  }
+
+  Office& office_;
+  const RecordedMotion& recorded_;
+  const ExaminationSettings& settings_;
+  const std::function<void(double)>& progress_;
+  const internal::Derivation derivation_ = {
+      model(), office_.data, [this](const Eigen::MatrixXd& q) { return findCoM(q); }};
+  double passes_ = 1., done_ = 0.;
+  internal::StepSpeeds steps_;
+  Mask near_jumps_;
+  const ContactSplit* split_ = &office_.split;  // what carries: the contacts, or
+  std::optional<ContactSplit> links_;           // those with links besides
+  std::optional<internal::MotionSweep> link_sweep_;
 };
 
 MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded,
                                                   const std::function<void(double)>& progress) {
-  MotionExamination found = {};
-  found.derived = deriveMotion(robot.getModel(), recorded, settings.cutoff);
-  const Motion& motion = found.derived.motion;
-  found.contacts = internal::computeContactMotions(desks, motion, workers);
-
-  std::vector<double> cutoffs;
-  if (settings.sensitivity && found.derived.cutoff > 0.)
-    for (const double cutoff : {0.5 * found.derived.cutoff, 2. * found.derived.cutoff})
-      if (cutoff < kMaximalCutoff * found.derived.frame_rate) cutoffs.push_back(cutoff);
-  Eigen::Index done = 0;
-  const auto work = double(motion.frames()) * double(2 + !settings.bodies.empty() + cutoffs.size());
-  AnalysisSettings analysis_settings = settings.analysis;
-  analysis_settings.progress = nullptr;
-  if (progress)
-    analysis_settings.progress = [&](Eigen::Index frames) {
-      progress(double(done + frames) / work);
-    };
-  const auto analyze = [&](internal::Desks& part_robots, const Motion& moved,
-                           const ContactSchedule& schedule, double ground_height) {
-    MotionAnalysis analysis = internal::analyzeMotion(part_robots, ground_height, moved, schedule,
-                                                      analysis_settings, workers);
-    done += motion.frames();
-    return analysis;
-  };
-  const auto judge = [&](const Attempt& attempt, const DerivedMotion& derived,
-                         const std::vector<ContactMotion>& motions,
-                         const MotionAnalysis& analysis) {
-    Eigen::Array<bool, Eigen::Dynamic, 1> unsure = derived.unsure;
-    addSmeared(attempt.inference.schedule, derived.motion.time, derived.cutoff, unsure);
-    return internal::judgeMotion(attempt.parts->robot, derived.motion, recorded, motions,
-                                 attempt.inference.ground, analysis, unsure, settings.verdict,
-                                 workers);
-  };
-
-  ContactSchedule none;
-  none.active.resize(0, motion.frames());
-  const MotionAnalysis dynamics = analyze(part_desks, motion, none, robot.getGroundHeight());
-  const bool exact = found.derived.cutoff == 0. ||
-                     (found.derived.is_automatic && found.derived.thinned_noise <= kExactNoise);
-  if (recorded.schedule.has_value())
-    for (const std::string& name : recorded.schedule->names) robot.getContact(name);
-  const auto attempt = [&](const PartRobot& used, internal::Desks& used_desks) {
-    Attempt made = {&used, &used_desks, {}, {}, {}, 0., {}, {}};
-    made.motions = internal::computeContactMotions(used_desks, motion, workers);
-    const auto infer = [&](const ContactSchedule* schedule) {
-      return inferContacts(used, made.motions, dynamics, exact, settings.detection, schedule);
-    };
-    made.inference = infer(recorded.schedule ? &*recorded.schedule : nullptr);
-    if (recorded.schedule) made.inferred = gatherParts(robot, used, infer(nullptr).schedule);
-    makeRelative(made.inference.ground_velocity, made.motions);
-    const double given = settings.detection.ground_height;
-    made.ground_height =
-        findMeanGround(made.inference, std::isnan(given) ? robot.getGroundHeight() : given);
-    made.analysis = analyze(used_desks, motion, made.inference.schedule, made.ground_height);
-    made.verdict = judge(made, found.derived, made.motions, made.analysis);
-    return made;
-  };
-
-  Attempt best = attempt(parts, part_desks);
-  // With links, where the contacts alone do not suffice, and some are low then.
-  std::optional<PartRobot> body_parts;
-  std::optional<internal::Desks> body_desks;
-  if (!settings.bodies.empty()) {
-    const Eigen::Array<bool, Eigen::Dynamic, 1> missing =
-        findMissing(best.verdict, settings.verdict);
-    std::vector<BodyPoints> bodies;
-    if (isMuch(missing) && parts.parts.size() < kMaximalParts)
-      bodies = internal::screenBodies(robot.getModel(), settings.bodies, motion, missing,
-                                      findLevels(best.inference), settings.detection.body_reach,
-                                      kMaximalParts - parts.parts.size());
-    if (bodies.empty()) {
-      done += motion.frames();
-      if (progress) progress(double(done) / work);
-    } else {
-      body_parts.emplace(splitContacts(robot, bodies));
-      body_desks.emplace(body_parts->robot, settings.analysis.lanes);
-      Attempt other = attempt(*body_parts, *body_desks);
-      const Eigen::Index given =
-          missing.count() - findMissing(other.verdict, settings.verdict).count();
-      if (given > 0 && double(given) >= kLeastGain * double(missing.count()))
-        best = std::move(other);
-    }
-  }
-
-  const PartRobot& used = *best.parts;
-  found.parts = used.parts;
-  found.part_motions = std::move(best.motions);
-  found.inferred = std::move(best.inferred);
-  const ContactSchedule& schedule = best.inference.schedule;
-  found.schedule = gatherParts(robot, used, schedule);
-  if (recorded.schedule.has_value())
-    found.schedule.confidence = findRecordedConfidence(found.schedule.names, *recorded.schedule);
-  found.bodies = gatherBodies(used, schedule);
-  found.ground = findGround(found.contacts, used.parts, found.part_motions, best.inference.ground);
-  if (!settings.bodies.empty()) {
-    const std::vector<double> levels = findLevels(best.inference);
-    Eigen::Array<bool, Eigen::Dynamic, 1> missing(motion.frames());
-    missing.setConstant(false);
-    for (const MotionFault fault : {MotionFault::ResidualForce, MotionFault::ResidualTorque,
-                                    MotionFault::FlightWithSupportNeeded})
-      missing = missing || best.verdict[fault].measured.array() > kSeated;
-    if (!levels.empty() && isMuch(missing))
-      found.seats = internal::findSeats(settings.bodies, motion,
-                                        {used, found.part_motions, schedule, best.analysis, missing,
-                                         *std::max_element(levels.begin(), levels.end())},
-                                        settings);
-  }
-  found.verdict = std::move(best.verdict);
-  found.analysis =
-      gatherParts(robot, used, found.contacts, found.part_motions, std::move(best.analysis));
-  dropIdle(found.bodies, found.analysis.bodies);
-  internal::judgeNormals(found.contacts, found.analysis.contacts, motion.time, settings.verdict,
-                         found.verdict);
-  found.statistics = summarizeMotion(robot, motion, found.analysis, found.verdict);
-  for (const double cutoff : cutoffs) {
-    const DerivedMotion other = rederiveMotion(robot.getModel(), recorded, cutoff);
-    const MotionAnalysis other_analysis =
-        analyze(*best.desks, other.motion, schedule, best.ground_height);
-    std::vector<ContactMotion> motions =
-        internal::computeContactMotions(*best.desks, other.motion, workers);
-    makeRelative(best.inference.ground_velocity, motions);
-    CutoffSensitivity sensitivity = {};
-    sensitivity.cutoff = cutoff;
-    sensitivity.verdict = judge(best, other, motions, other_analysis);
-    internal::judgeNormals(found.contacts, found.analysis.contacts, motion.time, settings.verdict,
-                           sensitivity.verdict);
-    sensitivity.statistics = summarizeMotion(
-        robot, other.motion,
-        gatherParts(robot, used, internal::computeContactMotions(desks, other.motion, workers),
-                    motions, other_analysis),
-        sensitivity.verdict);
-    found.sensitivity.push_back(std::move(sensitivity));
-  }
-  found.inference = std::move(best.inference);
-  return found;
+  return Case(*this, recorded, progress).examine();
 }
 
 MotionExaminer::MotionExaminer(const DynaCoM& robot, const ExaminationSettings& settings) {

@@ -8,11 +8,10 @@
 #include <utility>
 
 #include "check.hpp"
-#include "convex_hull.hpp"
-#include "motion_steps.hpp"
+#include "motion_judgement.hpp"
 #include "motion_windows.hpp"
 #include "nan.hpp"
-#include "step_speeds.hpp"
+#include "support_meter.hpp"
 
 namespace dynacom {
 
@@ -89,61 +88,6 @@ double groundAt(const Eigen::MatrixXd& ground, Eigen::Index k, Eigen::Index fram
 // How fast a contact moves along the ground in a frame.
 double slidingSpeed(const ContactMotion& contact, Eigen::Index frame) {
   return contact.velocity.col(frame).head<2>().norm();
-}
-
-// Measures how far the centre of pressure that is needed lies outside what carries.
-class SupportMeter {
- public:
-  SupportMeter(const DynaCoM& robot, const std::vector<ContactMotion>& contacts,
-               const MotionAnalysis& analysis)
-      : contacts_(contacts), analysis_(analysis) {
-    for (const ContactMotion& contact : contacts)
-      corners_.push_back(robot.getContact(contact.name)->getCorners());
-  }
-
-  double measure(Eigen::Index frame) {
-    carrying_.clear();
-    double height = 0.;
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      if (!analysis_.contacts[k].active[frame]) continue;
-      const Eigen::Quaterniond rotation(Eigen::Vector4d(contacts_[k].rotation.col(frame)));
-      const Eigen::Matrix<double, 3, 2> axes = rotation.toRotationMatrix().leftCols<2>();
-      for (Eigen::Index i = 0; i < corners_[k].cols(); ++i) {
-        const Eigen::Vector3d corner = contacts_[k].position.col(frame) + axes * corners_[k].col(i);
-        carrying_.push_back(corner.head<2>());
-        height += corner.z();
-      }
-    }
-    height /= double(carrying_.size());
-    const auto force = analysis_.ground_force.col(frame);
-    const auto torque = analysis_.ground_torque.col(frame);
-    const auto com = analysis_.com.col(frame);
-    const Eigen::Vector2d cop = com.head<2>() + (Eigen::Vector2d(-torque.y(), torque.x()) -
-                                                 force.head<2>() * (com.z() - height)) /
-                                                    force.z();
-    return cop.allFinite() ? orInfinity(internal::distanceToHull(cop, carrying_))
-                           : std::numeric_limits<double>::infinity();
-  }
-
- private:
-  const std::vector<ContactMotion>& contacts_;
-  const MotionAnalysis& analysis_;
-  std::vector<Eigen::Matrix2Xd> corners_;  // of each contact, in its surface
-  std::vector<Eigen::Vector2d> carrying_;  // of active contacts in a frame, in the world
-};
-
-// Marks the frames near steps that are faster than they may be.
-void markAroundJumps(const Eigen::VectorXd& time, const Eigen::ArrayXd& speed,
-                     const VerdictSettings& settings, Mask& near_jumps) {
-  const Eigen::Index frames = time.size();
-  for (Eigen::Index step = 0; step < speed.size(); ++step) {
-    if (!(speed[step] > settings.discontinuity.limit)) continue;
-    Eigen::Index first = std::max<Eigen::Index>(step - kJumpFrames, 0);
-    Eigen::Index last = std::min(step + 1 + kJumpFrames, frames - 1);
-    while (first > 0 && time[step] - time[first - 1] <= settings.jump_time) --first;
-    while (last < frames - 1 && time[last + 1] - time[step + 1] <= settings.jump_time) ++last;
-    near_jumps.segment(first, last - first + 1).setConstant(true);
-  }
 }
 
 // @param nameSubject  gives the finding's subject for the frame of the worst
@@ -331,17 +275,6 @@ std::vector<std::string> MotionVerdict::getCodes() const {
   return codes;
 }
 
-MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
-                          const RecordedMotion& recorded,
-                          const std::vector<ContactMotion>& contacts, const Eigen::MatrixXd& ground,
-                          const MotionAnalysis& analysis, const VerdictSettings& settings,
-                          int threads, const Mask& unsure) {
-  requireField(threads >= 0, "threads", ">= 0", threads);
-  internal::Workers workers(threads);
-  return internal::judgeMotion(robot, motion, recorded, contacts, ground, analysis, unsure,
-                               settings, workers);
-}
-
 void internal::judgeNormals(const std::vector<ContactMotion>& contacts,
                             const std::vector<MotionAnalysis::Contact>& analyzed,
                             const Eigen::VectorXd& time, const VerdictSettings& settings,
@@ -354,27 +287,59 @@ void internal::judgeNormals(const std::vector<ContactMotion>& contacts,
     conclude(time, settings, verdict);
 }
 
-MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
-                                    const RecordedMotion& recorded,
-                                    const std::vector<ContactMotion>& contacts,
-                                    const Eigen::MatrixXd& ground, const MotionAnalysis& analysis,
-                                    const Mask& unsure, const VerdictSettings& settings,
-                                    Workers& workers) {
+Mask internal::findNearJumps(const Eigen::VectorXd& time, const StepSpeeds& steps,
+                             const VerdictSettings& settings) {
+  const Eigen::Index frames = time.size();
+  Mask near_jumps = Mask::Constant(frames, false);
+  for (Eigen::Index step = 0; step < steps.speed.size(); ++step) {
+    if (!(steps.speed[step] > settings.discontinuity.limit)) continue;
+    Eigen::Index first = std::max<Eigen::Index>(step - kJumpFrames, 0);
+    Eigen::Index last = std::min(step + 1 + kJumpFrames, frames - 1);
+    while (first > 0 && time[step] - time[first - 1] <= settings.jump_time) --first;
+    while (last < frames - 1 && time[last + 1] - time[step + 1] <= settings.jump_time) ++last;
+    near_jumps.segment(first, last - first + 1).setConstant(true);
+  }
+  return near_jumps;
+}
+
+bool internal::isTooShort(const Motion& motion, const RecordedMotion& recorded) {
+  return motion.frames() < kMinimalFrames && !isRecorded(motion, recorded);
+}
+
+MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
+                          const RecordedMotion& recorded,
+                          const std::vector<ContactMotion>& contacts, const Eigen::MatrixXd& ground,
+                          const MotionAnalysis& analysis, const VerdictSettings& settings,
+                          int threads, const Mask& unsure) {
+  requireField(threads >= 0, "threads", ">= 0", threads);
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by judgeMotion before initialize()");
   settings.validate();
   motion.validate(robot.getModel());
   requireFitting(robot, motion, recorded, contacts, ground, analysis, unsure);
-  const Eigen::Index frames = motion.frames();
+  const internal::Carrier carrier = internal::describeCarrier(robot);
+  const internal::StepSpeeds steps =
+      internal::measureStepSpeeds(robot.getModel(), motion.time, recorded.q, settings);
+  Mask near_jumps = internal::findNearJumps(motion.time, steps, settings);
+  Mask all_unsure = near_jumps;
+  if (unsure.size() != 0) all_unsure = all_unsure || unsure;
+  internal::Workers workers(threads);
+  return internal::judgeMotion(
+      {carrier, motion.time, steps, contacts, ground, analysis, std::move(near_jumps),
+       std::move(all_unsure), internal::isTooShort(motion, recorded)},
+      settings, workers);
+}
 
+MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSettings& settings,
+                                    Workers& workers) {
+  const Eigen::VectorXd& time = judged.time;
+  const std::vector<ContactMotion>& contacts = judged.contacts;
+  const MotionAnalysis& analysis = judged.analysis;
+  const Eigen::Index frames = time.size();
   MotionVerdict verdict = {};
-  Mask near_jumps = Mask::Constant(frames, false);
-  const StepSpeeds steps = measureStepSpeeds(robot.getModel(), motion.time, recorded.q, settings);
-  markAroundJumps(motion.time, steps.speed, settings, near_jumps);
-  verdict.unsure = near_jumps;
-  if (unsure.size() != 0) verdict.unsure = verdict.unsure || unsure;
+  verdict.unsure = judged.unsure;
 
-  const double weight = robot.getMass() * kStandardGravity;
+  const double weight = judged.carrier.mass * kStandardGravity;
   std::array<Eigen::VectorXd, kMotionFaults> measured;
   for (Eigen::VectorXd& values : measured) values.setZero(frames);
   const auto measure = [&](MotionFault fault) -> Eigen::VectorXd& {
@@ -393,15 +358,16 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
     measure(MotionFault::ResidualTorque)[frame] = torque;
     const bool is_loaded = !(analysis.ground_force(2, frame) < settings.cop_force * weight);
     if (is_loaded && analysis.status[static_cast<std::size_t>(frame)] != DistributionStatus::Solved)
-      measure(MotionFault::CoPOutside)[frame] = support.measure(frame);
+      measure(MotionFault::CoPOutside)[frame] =
+          support.measure(frame, [&](std::size_t k) { return analysis.contacts[k].active[frame]; });
   };
   // How far a contact is below its ground; not a number where that is not known.
   const auto findDepth = [&](Eigen::Index k, Eigen::Index frame) {
-    return groundAt(ground, k, frame) - contacts[static_cast<std::size_t>(k)].height[frame];
+    return groundAt(judged.ground, k, frame) - contacts[static_cast<std::size_t>(k)].height[frame];
   };
   forEachBlock(workers, frames, [&]() -> BlockWork {
-    return [&, support = SupportMeter(robot, contacts, analysis)](Eigen::Index first,
-                                                                  Eigen::Index size) mutable {
+    return [&, support = SupportMeter(judged.carrier, contacts, analysis)](
+               Eigen::Index first, Eigen::Index size) mutable {
       for (Eigen::Index frame = first; frame < first + size; ++frame) {
         double& depth = measure(MotionFault::GroundPenetration)[frame];
         double& sliding = measure(MotionFault::FootSliding)[frame];
@@ -410,16 +376,17 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
           depth = std::fmax(depth, findDepth(Eigen::Index(k), frame));
           if (!analysis.contacts[k].active[frame]) continue;
           flies = false;
-          if (!near_jumps[frame]) sliding = std::max(sliding, slidingSpeed(contacts[k], frame));
+          if (!judged.near_jumps[frame])
+            sliding = std::max(sliding, slidingSpeed(contacts[k], frame));
         }
         if (!verdict.unsure[frame]) judgeForces(frame, flies, support);
       }
     };
   });
   Eigen::VectorXd& jumps = measure(MotionFault::Discontinuity);
-  for (Eigen::Index step = 0; step < steps.speed.size(); ++step)
+  for (Eigen::Index step = 0; step < judged.steps.speed.size(); ++step)
     for (const Eigen::Index frame : {step, step + 1})
-      jumps[frame] = std::max(jumps[frame], steps.speed[step]);
+      jumps[frame] = std::max(jumps[frame], judged.steps.speed[step]);
 
   // The first contact of which a frame's value is.
   const auto nameContact = [&](auto isIt) -> std::string {
@@ -431,9 +398,9 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
     const auto fault = static_cast<MotionFault>(k);
     if (fault == MotionFault::DownwardNormal) continue;
     verdict.findings[k] =
-        sumUp(measured[k], settings[fault], motion.time, [&](Eigen::Index frame) -> std::string {
+        sumUp(measured[k], settings[fault], time, [&](Eigen::Index frame) -> std::string {
           const double worst = measured[k][frame];
-          if (fault == MotionFault::Discontinuity) return steps.fastest;
+          if (fault == MotionFault::Discontinuity) return judged.steps.fastest;
           if (fault == MotionFault::GroundPenetration)
             return nameContact(
                 [&](std::size_t i) { return findDepth(Eigen::Index(i), frame) == worst; });
@@ -445,13 +412,11 @@ MotionVerdict internal::judgeMotion(const DynaCoM& robot, const Motion& motion,
           return "";
         });
   }
-  measureNormals(contacts, analysis.contacts, motion.time, settings, verdict);
-
-  const bool is_too_short = frames < kMinimalFrames && !isRecorded(motion, recorded);
-  if (is_too_short || (!holdsAny(verdict) && verdict.unsure.all()))
+  measureNormals(contacts, analysis.contacts, time, settings, verdict);
+  if (judged.is_too_short || (!holdsAny(verdict) && verdict.unsure.all()))
     verdict.outcome = MotionOutcome::Unknown;
   else
-    conclude(motion.time, settings, verdict);
+    conclude(time, settings, verdict);
   return verdict;
 }
 

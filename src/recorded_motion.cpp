@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
-#include "acceleration_noise.hpp"
 #include "check.hpp"
 #include "dynacom/centroidal.hpp"
 #include "motion_check.hpp"
+#include "motion_derivation.hpp"
 #include "nan.hpp"
 
 namespace dynacom {
@@ -34,10 +34,11 @@ double largestStep(const Eigen::VectorXd& time) {
 }
 
 // Estimates the noise, and says which cut-off suits it.
-double chooseCutoff(const pinocchio::Model& model, pinocchio::Data& data,
-                    const Eigen::VectorXd& time, const Eigen::MatrixXd& q, DerivedMotion& derived) {
+double chooseCutoff(const internal::Derivation& derivation, const Eigen::VectorXd& time,
+                    const Eigen::MatrixXd& q, DerivedMotion& derived) {
   const auto estimate = [&](Eigen::Index stride) {
-    return internal::estimateAccelerationNoise(model, data, time, q, stride);
+    return internal::estimateAccelerationNoise(derivation.model, derivation.findCoM, time, q,
+                                               stride);
   };
   const double rate = derived.frame_rate;
   derived.noise = derived.thinned_noise = estimate(1);
@@ -89,8 +90,36 @@ double findFrameRate(const Eigen::VectorXd& time) {
   return is_even ? double(steps) / duration : kNaN;
 }
 
+namespace {
+
+// Calls one of the functions below with what is needed for this once.
+template <class Function>
+DerivedMotion deriveOnce(const pinocchio::Model& model, Function derive) {
+  internal::DataPool data([&] { return std::make_unique<pinocchio::Data>(model); });
+  return derive(internal::Derivation{model, data, [&](const Eigen::MatrixXd& q) {
+                                       return internal::findCoM(model, *data.take(), q);
+                                     }});
+}
+
+}  // namespace
+
 DerivedMotion rederiveMotion(const pinocchio::Model& model, const RecordedMotion& recorded,
                              double cutoff) {
+  return deriveOnce(model, [&](const internal::Derivation& derivation) {
+    return internal::rederiveMotion(derivation, recorded, cutoff);
+  });
+}
+
+DerivedMotion deriveMotion(const pinocchio::Model& model, const RecordedMotion& recorded,
+                           double cutoff) {
+  return deriveOnce(model, [&](const internal::Derivation& derivation) {
+    return internal::deriveMotion(derivation, recorded, cutoff);
+  });
+}
+
+DerivedMotion internal::rederiveMotion(const Derivation& derivation, const RecordedMotion& recorded,
+                                       double cutoff) {
+  const pinocchio::Model& model = derivation.model;
   internal::requireTime(recorded.time);
   DerivedMotion derived = {};
   derived.mismatch = {kNaN, kNaN};
@@ -101,10 +130,12 @@ DerivedMotion rederiveMotion(const pinocchio::Model& model, const RecordedMotion
   derived.is_automatic = std::isnan(cutoff) && recorded.time.size() > 1;
   internal::requireSize("q", recorded.q.rows(), Eigen::Index(model.nq), "components (nq)");
   internal::requireSize("q", recorded.q.cols(), recorded.time.size(), "frames");
-  std::optional<pinocchio::Data> data;
-  if (derived.is_automatic || cutoff > 0.) data.emplace(model);
-  if (std::isnan(cutoff))
-    cutoff = derived.is_automatic ? chooseCutoff(model, *data, time, recorded.q, derived) : 0.;
+  if (derived.is_automatic) {
+    requireConfigurations(model, recorded.q, recorded.time.size());
+    cutoff = chooseCutoff(derivation, time, recorded.q, derived);
+  } else if (std::isnan(cutoff)) {
+    cutoff = 0.;
+  }
   if (!(cutoff >= 0.) || !std::isfinite(cutoff))
     throwInvalid("cutoff must be finite and >= 0 Hz, got ", cutoff);
   if (cutoff > 0. && recorded.time.size() > 1) {
@@ -121,14 +152,17 @@ DerivedMotion rederiveMotion(const pinocchio::Model& model, const RecordedMotion
           : recorded.q);
   derived.motion.time = recorded.time;
   derived.unsure.setConstant(recorded.time.size(), false);
-  if (derived.cutoff > 0.)
+  if (derived.cutoff > 0.) {
+    const auto data = derivation.data.take();
     for (const bool is_first : {true, false}) markUnsure(model, *data, is_first, derived);
+  }
   if (is_even) derived.time_error = (recorded.time - time).cwiseAbs().maxCoeff();
   return derived;
 }
 
-DerivedMotion deriveMotion(const pinocchio::Model& model, const RecordedMotion& recorded,
-                           double cutoff) {
+DerivedMotion internal::deriveMotion(const Derivation& derivation, const RecordedMotion& recorded,
+                                     double cutoff) {
+  const pinocchio::Model& model = derivation.model;
   internal::requireTime(recorded.time);
   DerivativeMismatch mismatch = {kNaN, kNaN};
   for (const auto& [name, values] : {std::pair("v", &recorded.v), std::pair("a", &recorded.a)}) {
@@ -150,7 +184,7 @@ DerivedMotion deriveMotion(const pinocchio::Model& model, const RecordedMotion& 
       return derived;
     }
   }
-  DerivedMotion derived = rederiveMotion(model, recorded, cutoff);
+  DerivedMotion derived = rederiveMotion(derivation, recorded, cutoff);
   derived.mismatch = mismatch;
   return derived;
 }

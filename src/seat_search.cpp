@@ -51,14 +51,24 @@ std::vector<Run> findRuns(const Eigen::Array<bool, Eigen::Dynamic, 1>& missing,
   return runs;
 }
 
-// Where a link's points are in each of some frames, at their lowest.
-std::vector<Eigen::Matrix3Xd> placePoints(const pinocchio::Model& model, pinocchio::Data& data,
-                                          const BodyPoints& body, const Motion& motion,
-                                          const std::vector<Index>& frames) {
-  std::vector<Eigen::Matrix3Xd> places;
+// Where all joints are in each of some frames.
+std::vector<std::vector<pinocchio::SE3>> placeJoints(const SeatQuestion& question,
+                                                     const Motion& motion,
+                                                     const std::vector<Index>& frames) {
+  std::vector<std::vector<pinocchio::SE3>> joints;
   for (const Index frame : frames) {
-    pinocchio::forwardKinematics(model, data, motion.q.col(frame));
-    const pinocchio::SE3& joint = data.oMi[body.joint];
+    pinocchio::forwardKinematics(question.model, question.data, motion.q.col(frame));
+    joints.emplace_back(question.data.oMi.begin(), question.data.oMi.end());
+  }
+  return joints;
+}
+
+// Where a link's points are in each of some frames, at their lowest.
+std::vector<Eigen::Matrix3Xd> placePoints(const std::vector<std::vector<pinocchio::SE3>>& joints,
+                                          const BodyPoints& body) {
+  std::vector<Eigen::Matrix3Xd> places;
+  for (const std::vector<pinocchio::SE3>& placed : joints) {
+    const pinocchio::SE3& joint = placed[body.joint];
     Eigen::Matrix3Xd points = joint.rotation() * body.points;
     points.colwise() += joint.translation();
     points.row(2) -= body.radius.transpose();
@@ -74,15 +84,11 @@ std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion&
   const std::vector<Run> runs = findRuns(question.missing, motion.time);
   std::vector<Seat> seats;
   if (runs.empty()) return seats;
-  const pinocchio::Model& model = question.parts.robot.getModel();
-  pinocchio::Data data(model);
-  const double gravity = -question.parts.robot.getSettings().gravity.z();
-  const double weight = question.parts.robot.getMass() * gravity;
+  const double weight = -question.parts.carrier.mass * question.parts.carrier.gravity.z();
   if (!(weight > 0.)) return seats;
   std::vector<double> part_mu;
-  for (const PartRobot::Part& part : question.parts.parts) {
-    const auto point =
-        std::dynamic_pointer_cast<const ContactPoint>(question.parts.robot.getContact(part.name));
+  for (const FixedContact& part : question.parts.carrier.contacts) {
+    const auto* point = dynamic_cast<const ContactPoint*>(part.contact.get());
     part_mu.push_back(point ? point->getSettings().mu : 0.);
   }
   const double body_mu = part_mu.empty() ? 0.7 : *std::min_element(part_mu.begin(), part_mu.end());
@@ -93,10 +99,11 @@ std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion&
       const Index frame = run.first + k * (run.behind - 1 - run.first) / (kSamples - 1);
       if (frames.empty() || frames.back() != frame) frames.push_back(frame);
     }
+    const auto joints = placeJoints(question, motion, frames);
     Seat best = {"", run.first, run.behind, 0., 0.};
     for (const BodyPoints& body : bodies) {
       if (body.points.cols() == 0) continue;
-      const auto places = placePoints(model, data, body, motion, frames);
+      const auto places = placePoints(joints, body);
       Eigen::Matrix3Xd mean = Eigen::Matrix3Xd::Zero(3, body.points.cols());
       for (const Eigen::Matrix3Xd& points : places) mean += points / double(places.size());
       const double height = mean.row(2).minCoeff();

@@ -4,16 +4,19 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "contact_split.hpp"
 #include "dynacom/motion_examination.hpp"
 
 namespace dynacom::internal {
 
 /// What seats are looked for in.
 struct SeatQuestion {
-  const PartRobot& parts;
+  const pinocchio::Model& model;
+  pinocchio::Data& data;
+  const ContactSplit& parts;
   const std::vector<ContactMotion>& motions;             // of the parts
   const ContactSchedule& schedule;                       // of the parts
-  const MotionAnalysis& analysis;                        // with these
+  const MotionAnalysis& analysis;                        // with what the motion needs
   const Eigen::Array<bool, Eigen::Dynamic, 1>& missing;  // frames in which they do not suffice
   double highest_ground;                                 // [m]
 };

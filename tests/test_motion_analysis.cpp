@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <set>
 #include <thread>
 
 #include "dynacom/contact6d.hpp"
@@ -576,7 +577,18 @@ BOOST_AUTO_TEST_CASE(quaternions_that_are_nearly_normalized_are_taken_as_they_ar
   AnalysisSettings settings;
   const auto actual = analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
   settings.lanes = 1;
-  checkSameBits(actual, analyzeMotion(walk.robot, walk.motion, walk.schedule, settings));
+  const auto expected = analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
+  BOOST_TEST((actual.status == expected.status));
+  // Lanes leave the motion alone, and share what it needs all the same.
+  const auto others = numbersOf(expected);
+  for (const auto& [name, values] : numbersOf(actual)) BOOST_TEST_CONTEXT(name) {
+      if (std::set<std::string>{"com", "vcom", "acom", "am", "dam", "ground_force", "ground_torque"}
+              .count(name))
+        BOOST_TEST(sameBits(values, others.at(name)));
+      const double scale = name == "residual" ? walk.robot.getMass() * 9.81 : 1.;
+      for (Index frame = 0; frame < values.cols(); ++frame)
+        BOOST_TEST(sameOrNaN(values.col(frame) / scale, others.at(name).col(frame) / scale, 1e-10));
+    }
 }
 
 BOOST_AUTO_TEST_CASE(numbers_of_threads_and_lanes_out_of_range_are_refused) {

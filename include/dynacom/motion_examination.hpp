@@ -77,8 +77,8 @@ struct MotionExamination {
   std::vector<CutoffSensitivity> sensitivity;  ///< with half, and with twice the cut-off
 };
 
-/// Judges recorded motions of one robot. What it needs for that, threads and copies of the robot,
-/// it keeps from one motion to the next: for short clips, these would take as long as the motion.
+/// Judges recorded motions of one robot. What it needs for that, threads, solvers and storage, it
+/// keeps from one motion to the next: for short clips, these would take as long as the motion.
 /// In a process that was forked from its own it has no threads but the caller's.
 class DYNACOM_EXPORT MotionExaminer {
  public:

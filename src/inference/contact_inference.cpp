@@ -7,6 +7,7 @@
 
 #include "../check.hpp"
 #include "../nan.hpp"
+#include "contact_inference.hpp"
 #include "dynacom/contact_point.hpp"
 #include "ground_slope.hpp"
 #include "schedule_path.hpp"
@@ -62,8 +63,8 @@ double findGround(const internal::Rests& rests, Index frame, bool active) {
   return height;
 }
 
-internal::KnownContacts findKnown(const PartRobot& parts, const ContactSchedule& recorded,
-                                  Index frames) {
+internal::KnownContacts findKnown(const internal::ContactSplit& parts,
+                                  const ContactSchedule& recorded, Index frames) {
   recorded.validate(frames);
   internal::KnownContacts known;
   std::vector<std::string> names;
@@ -109,11 +110,22 @@ Eigen::Matrix3Xd findFooting(const ContactInference& found,
 ContactInference inferContacts(const PartRobot& parts, const std::vector<ContactMotion>& motions,
                                const MotionAnalysis& dynamics, bool exact,
                                const DetectionSettings& settings, const ContactSchedule* recorded) {
+  return internal::inferContacts(
+      {parts.parts, parts.bodies, internal::describeCarrier(parts.robot)}, motions, dynamics, exact,
+      settings, recorded);
+}
+
+ContactInference internal::inferContacts(const ContactSplit& parts,
+                                         const std::vector<ContactMotion>& motions,
+                                         const MotionAnalysis& dynamics, bool exact,
+                                         const DetectionSettings& settings,
+                                         const ContactSchedule* recorded) {
   settings.validate();
   const Eigen::VectorXd& time = dynamics.time;
   const Index frames = time.size();
   const std::size_t count = parts.parts.size();
   internal::requireSize("motions", motions.size(), count, "parts");
+  internal::requireSize("parts.robot", parts.carrier.contacts.size(), count, "contacts");
   if (count > kMaximalParts)
     internal::throwInvalid("contacts must have at most ", kMaximalParts, " parts, got ", count);
   for (const auto* values : {&dynamics.com, &dynamics.ground_force, &dynamics.ground_torque})
@@ -123,8 +135,8 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
   std::vector<internal::PointTrack> tracks;
   tracks.reserve(count);
   const auto addTrack = [&](std::size_t k, const Eigen::Matrix3Xd& velocity) {
-    const auto contact =
-        std::dynamic_pointer_cast<const ContactPoint>(parts.robot.getContact(parts.parts[k].name));
+    const auto* contact =
+        dynamic_cast<const ContactPoint*>(parts.carrier.contacts[k].contact.get());
     tracks.push_back({parts.parts[k].limb, contact ? contact->getSettings().mu : 0.,
                       parts.parts[k].contact >= contacts, motions[k].position, velocity});
   };
@@ -149,8 +161,8 @@ ContactInference inferContacts(const PartRobot& parts, const std::vector<Contact
   const std::vector<internal::Rests> rests = internal::findRests(tracks, time, exact, settings);
   const internal::CostScales scales = internal::findScales(tracks, rests, time, settings);
   const internal::WrenchTrack wrench{dynamics.com, dynamics.ground_force, dynamics.ground_torque};
-  const double gravity = -parts.robot.getSettings().gravity.z();
-  const double weight = parts.robot.getMass() * (gravity > 0. ? gravity : kStandardGravity);
+  const double gravity = -parts.carrier.gravity.z();
+  const double weight = parts.carrier.mass * (gravity > 0. ? gravity : kStandardGravity);
   internal::KnownContacts known;
   if (recorded) known = findKnown(parts, *recorded, frames);
   const internal::SchedulePath path = internal::findSchedulePath(
