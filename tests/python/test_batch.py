@@ -19,8 +19,9 @@ import pytest
 
 import dynacom
 from batch_clips import cut, hover, motion, same, write_clips, write_program
-from dynacom import DynacomError, batch_overview, batch_store
+from dynacom import DynacomError, batch_overview, batch_pool, batch_store
 from dynacom.batch_files import find_motions
+from dynacom.batch_pool import Task
 from dynacom.batch_row import Job, error_row
 from dynacom.batch_store import Store
 from dynacom.motion_report import FAULTS
@@ -271,6 +272,36 @@ def run_again(out, paths, **options):
     states = []
     table = dynacom.batch(paths, ROBOT, out=out, resume=True, progress=states.append, **options)
     return table, states[-1]
+
+
+def test_processes_start_before_they_are_needed(walks, tmp_path, anymal, monkeypatch):
+    """As many as there is work for; and they end, whatever else is wrong."""
+    begun = []
+    start = subprocess.Popen
+
+    def begin(*arguments, **options):
+        begun.append(start(*arguments, **options))
+        return begun[-1]
+
+    monkeypatch.setattr(batch_pool.subprocess, "Popen", begin)
+    job = Job(anymal, dynacom.AnalysisOptions())
+    pool = batch_pool.Pool(job, 3)
+    pool.start(2)
+    assert len(begun) == 2
+    tasks = [Task(k, f"{k}.npz", str(walks / f"{k}.npz"), None) for k in range(4)]
+    done = [reply for reply in pool.run(tasks) if reply is not None]
+    assert sorted(reply.index for reply in done) == [0, 1, 2, 3]
+    assert all(reply.rows[0]["status"] == "ok" for reply in done)
+    pool.close()
+    assert len(begun) == 3  # one more, for there was more to do than was said
+    assert all(process.poll() is not None for process in begun)
+
+    out = tmp_path / "out"
+    dynacom.batch(walks, ROBOT, out=out, jobs=1)
+    begun.clear()
+    refused("--resume", walks, ROBOT, out=out, jobs=2)
+    assert len(begun) == 2
+    assert all(process.poll() is not None for process in begun)
 
 
 def test_results_of_before_are_not_overwritten(walks, tmp_path):
