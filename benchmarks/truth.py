@@ -51,6 +51,8 @@ def measure(folder, sensitivity):
     print("clips ...", flush=True)
     figures["clips"] = truth_clips.measure(folder.parent)
     figures["walks"] = truth_clips.measure_walks(WALKS)
+    print("shares ...", flush=True)
+    figures["shares"] = truth_robustness.measure_shares(trials)
     if not sensitivity:
         return figures
     figures["standing"] = {}

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from statistics import median
 
 from truth_goals import goals, ratios, shown_changes, shown_feet
 
@@ -199,12 +200,22 @@ def constant_table(figures, thresholds):
     return table(head, rows)
 
 
+def share_table(figures, thresholds):
+    shares = figures["shares"]
+    kinds = list(next(iter(shares.values())))
+    rows = [[name, *(f"{row[kind]:.1f}" for kind in kinds)] for name, row in shares.items()]
+    medians = (median(row[kind] for row in shares.values()) for kind in kinds)
+    rows.append(["median", *(f"{value:.1f}" for value in medians)])
+    return table(["trial", *kinds], rows)
+
+
 TABLES = {
     "goals": goal_table,
     "changes": change_table,
     "feet": feet_table,
     "whole": whole_table,
     "filters": filter_table,
+    "shares": share_table,
     "statuses": status_table,
     "clips": clip_table,
     "walks": walk_table,

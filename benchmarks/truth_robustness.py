@@ -1,7 +1,9 @@
-"""What must not change the contacts: constants that are other ones, and a minute of standing."""
+"""What must not change the contacts: constants that are other ones, and a minute of standing; and
+what changes how contacts share the load: weights."""
 
+import copy
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +80,60 @@ def worst_rows(rows):
         "missed_of": most,
         "force": float(np.median(np.concatenate([row["feet"] for row in rows.values()]))),
     }
+
+
+# ---- Shares ----
+
+
+def ramped(**settings):
+    """With other settings of the detection."""
+
+    def change(trial, options):
+        for name, value in settings.items():
+            setattr(options.detection, name, value)
+        return trial
+
+    return change
+
+
+def weighted(factor):
+    """With other weights of the forces along the ground."""
+
+    def change(trial, options):
+        contacts = {}
+        for name, settings in trial.robot.contacts.items():
+            contacts[name] = copy.copy(settings)
+            weights = np.array(settings.weights, dtype=float)
+            weights[:2] *= factor
+            contacts[name].weights = weights
+        return replace(trial, robot=replace(trial.robot, contacts=contacts))
+
+    return change
+
+
+# What weights may be, by how the page calls it.
+SHARES = {
+    "as they are": ramped(),
+    "no ramp": ramped(ramp_least=1.0),
+    "ramp from 0.1": ramped(ramp_least=0.1),
+    "over 0.05 s": ramped(ramp=0.05),
+    "over 0.2 s": ramped(ramp=0.2),
+    "along × 0.1": weighted(0.1),
+    "along × 10": weighted(10.0),
+}
+
+
+def measure_shares(trials):
+    """The vertical force's error, mean of the feet [%]: by trial, and by weights."""
+    figures = {}
+    for trial in trials:
+        figures[trial.name] = {}
+        for name, change in SHARES.items():
+            options = dynacom.AnalysisOptions()
+            changed = change(trial, options)
+            found = score(truth_trials.analyze(changed, trial.cutoff, options=options), changed)
+            figures[trial.name][name] = float(np.mean(found["feet"]))
+    return figures
 
 
 # ---- Standing ----

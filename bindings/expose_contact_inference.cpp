@@ -23,8 +23,15 @@ const char* getMeaning(const std::string& constant) {
       {"moving_speed", "A part moves from this speed on: percentiles are of what moves [m/s]"},
       {"horizontal_part", "Of horizontal speeds so much counts: soles drift more than they float"},
       {"rest_duration", "How long a rest is at least [s]"},
+      {"same_rest_speed",
+       "Rests are one if in between the part is no faster than so many times the speed below which "
+       "it is at rest"},
       {"same_rest",
        "Rests are one if their heights differ by no more, and the part is slow in between [m]"},
+      {"near_movement",
+       "Frames count for heights and scales that are this close to one in which a part moves [s]"},
+      {"stir_speed",
+       "Frames count for heights and scales in which some part is faster than this [m/s]"},
       {"landing_height",
        "From, or to, how high above a stance a part has to be seen for the stance to be on the "
        "ground [m]"},
@@ -72,6 +79,9 @@ const char* getMeaning(const std::string& constant) {
        "What parts of a limb that is in contact already cost and are worth is multiplied by this"},
       {"rate", "All costs of a frame count so often in a second [1/s]"},
       {"change", "What it costs that a contact begins or ends"},
+      {"ramp", "A contact takes its load on, and gives it back, over so long [s]"},
+      {"ramp_least",
+       "A contact bears load this readily where it begins and ends; 1 is as readily as ever"},
   };
   const auto found = all.find(constant);
   return found == all.end() ? "" : found->second;
@@ -199,6 +209,9 @@ void exposeContactInference() {
                     "What the schedule cannot give of the wrench that the motion needs,\n"
                     "frames x 2: the norms of the force [m g] and of the moment about the\n"
                     "CoM [m g m].")
+      .add_property("slope", getter(&ContactInference::slope),
+                    "The ground's gradient (dz/dx, dz/dy), (2,), where all stances of contacts\n"
+                    "lie in one plane that is not level; else zero")
       .add_property("ground_velocity", getter(&ContactInference::ground_velocity),
                     "As given or found, (3,) [m/s]")
       .def(PrintVisitor<ContactInference>(&writeInference))

@@ -378,17 +378,12 @@ class MotionExaminer::Office::Case {
 
   MotionVerdict judge(const DerivedMotion& derived, const ContactInference& inference,
                       const SweptMotion& swept) const {
+    const ContactSchedule whole = gather(inference.schedule);
     return internal::judgeMotion(
         {split_->carrier, derived.motion.time, steps_, swept.parts, inference.ground,
-         swept.analysis, near_jumps_, findUnsure(derived, inference),
+         swept.analysis, swept.contacts, whole.active, near_jumps_, findUnsure(derived, inference),
          internal::isTooShort(derived.motion, recorded_)},
         settings_.verdict, office_.workers);
-  }
-
-  // Judges the normals of whole contacts, in a verdict about their parts.
-  void judgeNormals(const MotionExamination& found, MotionVerdict& verdict) const {
-    internal::judgeNormals(found.contacts, found.analysis.contacts, found.derived.motion.time,
-                           settings_.verdict, verdict);
   }
 
   // Looks for seats where more is missing than who leans lacks.
@@ -426,7 +421,6 @@ class MotionExaminer::Office::Case {
     dropIdle(found.bodies, found.analysis.bodies);
     found.contacts = std::move(swept.contacts);
     found.part_motions = std::move(swept.parts);
-    judgeNormals(found, found.verdict);
     found.statistics =
         summarizeMotion(office_.robot, found.derived.motion, found.analysis, found.verdict);
   }
@@ -437,7 +431,6 @@ class MotionExaminer::Office::Case {
     makeRelative(found.inference.ground_velocity, swept.parts);
     distribute(found.inference, swept);
     MotionVerdict verdict = judge(derived, found.inference, swept);
-    judgeNormals(found, verdict);
     MotionStatistics statistics =
         summarizeMotion(office_.robot, derived.motion,
                         internal::gatherParts(office_.robot, *split_, swept.contacts, swept.parts,

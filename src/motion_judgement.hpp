@@ -18,6 +18,8 @@ struct JudgedMotion {
   const std::vector<ContactMotion>& contacts;  // of the carrier
   const Eigen::MatrixXd& ground;               // contacts × frames, or × 1
   const MotionAnalysis& analysis;
+  const std::vector<ContactMotion>& faces;  // contacts whose normals count: the robot's, whole
+  const ContactSchedule::Matrix& active;    // whether they are, faces × frames
   Eigen::Array<bool, Eigen::Dynamic, 1> near_jumps;
   Eigen::Array<bool, Eigen::Dynamic, 1> unsure;  // near_jumps, and others
   bool is_too_short;                             // see kMinimalFrames
@@ -34,12 +36,5 @@ Eigen::Array<bool, Eigen::Dynamic, 1> findNearJumps(const Eigen::VectorXd& time,
 
 /// Whether there are fewer frames than kMinimalFrames, and their derivatives were computed.
 bool isTooShort(const Motion& motion, const RecordedMotion& recorded);
-
-/// Judges where normals point in a verdict of judgeMotion() that was made for other contacts: sets
-/// MotionVerdict::normals and what follows from DownwardNormal.
-/// @param contacts, analyzed  of the same contacts, in the same order
-void judgeNormals(const std::vector<ContactMotion>& contacts,
-                  const std::vector<MotionAnalysis::Contact>& analyzed, const Eigen::VectorXd& time,
-                  const VerdictSettings& settings, MotionVerdict& verdict);
 
 }  // namespace dynacom::internal

@@ -104,17 +104,16 @@ MotionFinding sumUp(Eigen::VectorXd measured, const FaultLimit& limit, const Eig
 
 // Where the normals of active contacts point: MotionVerdict::normals, and what is found of
 // DownwardNormal.
-void measureNormals(const std::vector<ContactMotion>& contacts,
-                    const std::vector<MotionAnalysis::Contact>& analyzed,
-                    const Eigen::VectorXd& time, const VerdictSettings& settings,
+void measureNormals(const internal::JudgedMotion& judged, const VerdictSettings& settings,
                     MotionVerdict& verdict) {
-  verdict.normals.clear();
+  const Eigen::VectorXd& time = judged.time;
+  const std::vector<ContactMotion>& contacts = judged.faces;
   Eigen::VectorXd measured = Eigen::VectorXd::Zero(time.size());
   std::vector<std::size_t> whose(static_cast<std::size_t>(time.size()));
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     double up = 0., downward = 0.;
     for (Eigen::Index frame = 0; frame < time.size(); ++frame) {
-      if (!analyzed[k].active[frame]) continue;
+      if (!judged.active(Eigen::Index(k), frame)) continue;
       const auto rotation = contacts[k].rotation.col(frame);
       const double z = 1. - 2. * (rotation[0] * rotation[0] + rotation[1] * rotation[1]);
       up += z;
@@ -125,7 +124,7 @@ void measureNormals(const std::vector<ContactMotion>& contacts,
       measured[frame] = angle;
       whose[static_cast<std::size_t>(frame)] = k;
     }
-    const auto count = double(analyzed[k].active.count());
+    const auto count = double(judged.active.row(Eigen::Index(k)).count());
     verdict.normals.push_back(count > 0. ? ContactNormal{up / count, downward / count}
                                          : ContactNormal{kNaN, kNaN});
   }
@@ -275,18 +274,6 @@ std::vector<std::string> MotionVerdict::getCodes() const {
   return codes;
 }
 
-void internal::judgeNormals(const std::vector<ContactMotion>& contacts,
-                            const std::vector<MotionAnalysis::Contact>& analyzed,
-                            const Eigen::VectorXd& time, const VerdictSettings& settings,
-                            MotionVerdict& verdict) {
-  measureNormals(contacts, analyzed, time, settings, verdict);
-  // Too few frames stay too few.
-  const bool is_known = verdict.outcome != MotionOutcome::Unknown || time.size() >= kMinimalFrames;
-  if (is_known && verdict[MotionFault::DownwardNormal].frames > 0 &&
-      (verdict.outcome != MotionOutcome::Unknown || holdsAny(verdict)))
-    conclude(time, settings, verdict);
-}
-
 Mask internal::findNearJumps(const Eigen::VectorXd& time, const StepSpeeds& steps,
                              const VerdictSettings& settings) {
   const Eigen::Index frames = time.size();
@@ -323,10 +310,13 @@ MotionVerdict judgeMotion(const DynaCoM& robot, const Motion& motion,
   Mask near_jumps = internal::findNearJumps(motion.time, steps, settings);
   Mask all_unsure = near_jumps;
   if (unsure.size() != 0) all_unsure = all_unsure || unsure;
+  ContactSchedule::Matrix active(Eigen::Index(contacts.size()), motion.frames());
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    active.row(Eigen::Index(k)) = analysis.contacts[k].active.transpose();
   internal::Workers workers(threads);
   return internal::judgeMotion(
-      {carrier, motion.time, steps, contacts, ground, analysis, std::move(near_jumps),
-       std::move(all_unsure), internal::isTooShort(motion, recorded)},
+      {carrier, motion.time, steps, contacts, ground, analysis, contacts, active,
+       std::move(near_jumps), std::move(all_unsure), internal::isTooShort(motion, recorded)},
       settings, workers);
 }
 
@@ -412,7 +402,7 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
           return "";
         });
   }
-  measureNormals(contacts, analysis.contacts, time, settings, verdict);
+  measureNormals(judged, settings, verdict);
   if (judged.is_too_short || (!holdsAny(verdict) && verdict.unsure.all()))
     verdict.outcome = MotionOutcome::Unknown;
   else

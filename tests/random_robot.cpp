@@ -114,6 +114,18 @@ State randomState(const pinocchio::Model& model, Random& random, double scale) {
           random.vector(model.nv, scale), random.vector(model.nv, scale)};
 }
 
+States randomStates(const pinocchio::Model& model, Random& random, Index frames, double scale) {
+  States states = {MatrixXd(model.nq, frames), MatrixXd(model.nv, frames),
+                   MatrixXd(model.nv, frames)};
+  for (Index frame = 0; frame < frames; ++frame) {
+    const State state = randomState(model, random, scale);
+    states.q.col(frame) = state.q;
+    states.v.col(frame) = state.v;
+    states.a.col(frame) = state.a;
+  }
+  return states;
+}
+
 State restState(const pinocchio::Model& model) {
   return {pinocchio::neutral(model), VectorXd::Zero(model.nv), VectorXd::Zero(model.nv)};
 }

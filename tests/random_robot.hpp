@@ -36,6 +36,14 @@ struct State {
 /// Far from the neutral configuration by about scale, in every joint; v and a are of that size too.
 State randomState(const pinocchio::Model& model, Random& random, double scale = 1.);
 
+/// Many of them, a column each: (nq, frames), (nv, frames).
+struct States {
+  MatrixXd q, v, a;
+};
+
+/// As randomState(), one after the other.
+States randomStates(const pinocchio::Model& model, Random& random, Index frames, double scale = 1.);
+
 /// The neutral configuration, not in motion.
 State restState(const pinocchio::Model& model);
 

@@ -39,16 +39,8 @@ struct Walker {
     ball.world_aligned = true;
     robot->addContact(std::make_shared<ContactPoint>(ball), "ball");
 
-    motion.time = VectorXd::LinSpaced(frames, 0., 1.);
-    motion.q.resize(model.nq, frames);
-    motion.v.resize(model.nv, frames);
-    motion.a.resize(model.nv, frames);
-    for (Index frame = 0; frame < frames; ++frame) {
-      const State state = randomState(model, random, 0.5);
-      motion.q.col(frame) = state.q;
-      motion.v.col(frame) = state.v;
-      motion.a.col(frame) = state.a;
-    }
+    const States states = randomStates(model, random, frames, 0.5);
+    motion = {VectorXd::LinSpaced(frames, 0., 1.), states.q, states.v, states.a};
   }
 
   Random random;

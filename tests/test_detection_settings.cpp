@@ -66,6 +66,9 @@ BOOST_AUTO_TEST_CASE(what_is_out_of_range_is_refused) {
     };
     refused(raise, {"DetectionSettings." + name + "_greatest", ">=", name + "_least"});
   }
+  for (const auto& [name, field] : {std::pair("further_points", &DetectionSettings::further_points),
+                                    std::pair("ramp_least", &DetectionSettings::ramp_least)})
+    refused([field = field](auto& s) { s.*field = 1.5; }, {name, "<= 1", "1.5"});
   refused([](auto& s) { s.ground_height = kInfinity; }, {"DetectionSettings.ground_height", "inf"});
   refused([](auto& s) { s.ground_velocity << 1., kNaN, 0.; },
           {"DetectionSettings.ground_velocity", "finite", "level"});

@@ -39,16 +39,8 @@ struct Walk {
     point.frame_name = "sole2";
     robot.addContact(std::make_shared<ContactPoint>(point), "hand", false);
 
-    motion.time = VectorXd::LinSpaced(frames, 0., 1.);
-    motion.q.resize(model.nq, frames);
-    motion.v.resize(model.nv, frames);
-    motion.a.resize(model.nv, frames);
-    for (Index frame = 0; frame < frames; ++frame) {
-      const State x = randomState(model, random, 0.02);
-      motion.q.col(frame) = x.q;
-      motion.v.col(frame) = x.v;
-      motion.a.col(frame) = x.a;
-    }
+    const States states = randomStates(model, random, frames, 0.02);
+    motion = {VectorXd::LinSpaced(frames, 0., 1.), states.q, states.v, states.a};
     // Not in the robot's order.
     schedule.names = {"hand", "foot on sole1", "foot on sole0"};
     schedule.active.resize(3, frames);
@@ -470,16 +462,8 @@ struct Chain {
     robot.addContact(std::make_shared<Contact6D>(settings), "sole");
 
     const Index frames = 53;
-    motion.time = VectorXd::LinSpaced(frames, 0., 1.);
-    motion.q.resize(model.nq, frames);
-    motion.v.resize(model.nv, frames);
-    motion.a.resize(model.nv, frames);
-    for (Index frame = 0; frame < frames; ++frame) {
-      const State x = randomState(model, random, 0.8);
-      motion.q.col(frame) = x.q;
-      motion.v.col(frame) = x.v;
-      motion.a.col(frame) = x.a;
-    }
+    const States states = randomStates(model, random, frames, 0.8);
+    motion = {VectorXd::LinSpaced(frames, 0., 1.), states.q, states.v, states.a};
     schedule = {{"sole"}, ContactSchedule::Matrix::Constant(1, frames, true)};
   }
 

@@ -29,6 +29,9 @@ struct DYNACOM_EXPORT ContactInference {
   /// What the schedule cannot give of the wrench that the motion needs, 2 × frames: the norms of
   /// the force [m g] and of the moment about the CoM [m g m].
   Eigen::Matrix2Xd missing;
+  /// The ground's gradient (∂z/∂x, ∂z/∂y), where all stances of contacts lie in one plane that is
+  /// not level; else zero.
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
   /// Velocity of the ground, as given or found, in the world [m/s].
   Eigen::Vector3d ground_velocity = Eigen::Vector3d::Zero();
 };

@@ -32,9 +32,13 @@ struct DYNACOM_EXPORT DetectionSettings {
   double horizontal_part = 0.4;
   /// How long a point is at rest at least [s].
   double rest_duration = 0.025;
-  /// Rests between which a point moves no faster than three times the above, and whose heights
-  /// differ by no more than this, are one [m].
-  double same_rest = 0.01;
+  /// Rests between which a point moves no faster than so many times the speed below which it is at
+  /// rest, and whose heights differ by no more than the second [m], are one.
+  double same_rest_speed = 3., same_rest = 0.01;
+  /// Of a motion's frames those count for heights and scales that are this close to one in which a
+  /// point moves [s], and in which some point is faster than the second [m/s]: it does not matter
+  /// for how long the robot stands still.
+  double near_movement = 0.5, stir_speed = 0.01;
 
   // Which stances are on the ground.
 
@@ -88,6 +92,12 @@ struct DYNACOM_EXPORT DetectionSettings {
   /// What the beginning or end of a contact costs.
   double change = 4.5;
 
+  // Shares of the load, see ContactSchedule::readiness.
+
+  /// A contact takes its load on, and gives it back, over so long [s]; and this readily at the very
+  /// beginning and end, where 1 is as readily as ever. The second is no more than 1.
+  double ramp = 0.1, ramp_least = 0.3;
+
   /// The ground's height under all contacts [m]; NaN if it is to be found. What rests higher above
   /// it than `same_ground` is in the air.
   double ground_height = std::numeric_limits<double>::quiet_NaN();
@@ -100,8 +110,8 @@ struct DYNACOM_EXPORT DetectionSettings {
   static const std::vector<Constant>& constants();
 
   /// @throws std::invalid_argument naming the first field out of its range: constants are > 0,
-  ///         none that is called least is greater than its greatest, and further_points is no more
-  ///         than 1; the ground's velocity is level
+  ///         none that is called least is greater than its greatest, and further_points and
+  ///         ramp_least are no more than 1; the ground's velocity is level
   void validate() const;
   std::string to_string() const;
   bool operator==(const DetectionSettings& other) const;

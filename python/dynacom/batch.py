@@ -6,6 +6,7 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -171,14 +172,21 @@ def run_batch(
         files = dict(list(files.items())[part - 1 :: parts])
     folder = out.absolute() / "frames" if frames else None
     job = Job(robot, options, fps, quat, trust, folder)
-    with Store.open(out, job, list(files), resume) as store:
+    with ExitStack() as stack:
+        if engine == "local":
+            # Processes start while the robot's meshes are read here.
+            pool = Pool(job, jobs)
+            stack.callback(pool.close)  # whatever is wrong with the folder
+            pool.start(len(files))
+        store = stack.enter_context(Store.open(out, job, list(files), resume))
+        if engine == "ray":
+            pool = RayPool(job, jobs)
 
         def tasks() -> Iterator[Task]:
             for index, (name, file) in enumerate(files.items()):
                 file = file if is_url(file) else os.path.abspath(file)
                 yield Task(index, name, file, store.known(index))
 
-        pool = RayPool(job, jobs) if engine == "ray" else Pool(job, jobs)
         state = BatchProgress(len(files))
         try:
             for done in pool.run(tasks()):

@@ -42,13 +42,24 @@ class Done(NamedTuple):
 
 
 class Pool:
-    """Worker processes. They start when there is something to do, and end with :meth:`close`."""
+    """Worker processes. They start when there is something to do, and end with :meth:`close`.
+
+    What they need for it they get with the first file.
+    """
 
     def __init__(self, job: Job, jobs: int | None) -> None:
         """Of so many processes; by default of as many as there are cores."""
         self._job = job
         self._jobs = jobs or len(os.sched_getaffinity(0))
         self._workers: list[_Worker] = []
+
+    def start(self, files: int) -> None:
+        """Starts what so many files will need: processes take a while until they can do anything.
+
+        Meanwhile the caller finds out what is to be done, for which it may read meshes.
+        """
+        while len(self._workers) < min(self._jobs, files):
+            self._workers.append(_Worker.start())
 
     def run(self, tasks: Iterable[Task]) -> Iterator[Done | None]:
         """Judges files, in any order, a few at a time.
@@ -106,8 +117,8 @@ class Pool:
                 if task is None:
                     return
                 if number == len(self._workers):
-                    self._workers.append(_Worker.start(self._job))
-                self._workers[number].give(task)
+                    self._workers.append(_Worker.start())
+                self._workers[number].give(task, self._job)
 
 
 @dataclass
@@ -116,10 +127,11 @@ class _Worker:
     connection: Connection
     #: In the order in which it does them.
     given: deque[Task] = field(default_factory=deque)
+    has_job: bool = False
     has_started: bool = False
 
     @classmethod
-    def start(cls, job: Job) -> "_Worker":
+    def start(cls) -> "_Worker":
         ours, its = Pipe()
         # Neither fork, which copies threads' locks, nor multiprocessing's spawn, which runs the
         # caller's script again.
@@ -137,14 +149,14 @@ class _Worker:
             start_new_session=True,  # Ctrl-C is for us
         )
         its.close()
-        worker = cls(process, ours)
-        with suppress(OSError):  # what died at once is found out on receiving
-            ours.send(job)
-        return worker
+        return cls(process, ours)
 
-    def give(self, task: Task) -> None:
+    def give(self, task: Task, job: Job) -> None:
         self.given.append(task)
-        with suppress(OSError):
+        with suppress(OSError):  # what has died is found out on receiving
+            if not self.has_job:
+                self.has_job = True
+                self.connection.send(job)
             self.connection.send(task)
 
     def receive(self) -> Done | None:

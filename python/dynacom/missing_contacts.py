@@ -94,10 +94,7 @@ def missing_texts(
         )
     # Neither a robot's description that is wrong nor a seat says anything of loads.
     if not is_reversed and not found.seats and _is_load(statistics):
-        force, torque = (
-            ", ".join(f"{value:.3g}" for value in part)
-            for part in statistics.mean_residual.reshape(2, 3).tolist()
-        )
+        force, torque = map(_vector_text, statistics.mean_residual.reshape(2, 3))
         yield (
             f"Where a contact is active, ({force}) N and ({torque}) N m are missing on average, "
             "forward, left and up: a load that nobody has told of may be the reason, and --payload "
@@ -110,6 +107,12 @@ def unexplained(statistics: MotionStatistics) -> dict[str, Any]:
     residual = statistics.mean_residual.tolist()
     share = 1.0 - statistics.share(DistributionStatus.Solved)
     return {"share": share, "force": residual[:3], "torque": residual[3:]}
+
+
+def _vector_text(values: np.ndarray) -> str:
+    """Three numbers, of which those that are nothing beside the others are 0."""
+    small = np.abs(values) < 1e-3 * np.abs(values).max()
+    return ", ".join(f"{value:.3g}" for value in np.where(small, 0.0, values))
 
 
 def _times_text(times: list[list[float]]) -> str:

@@ -194,14 +194,15 @@ def check_angles(path: Path, robot: Robot, names: Sequence[str], angles: np.ndar
     lower = robot.model.lowerPositionLimit[indices]
     upper = robot.model.upperPositionLimit[indices]
     angles = angles[:, limited]
+    above_lower = angles.min(axis=0) >= lower - NOTED_EXCESS
+    if (above_lower & (angles.max(axis=0) <= upper + NOTED_EXCESS)).all():
+        return []
 
     def excess(values: np.ndarray) -> np.ndarray:
         return np.maximum(lower - values, values - upper)
 
     outside = excess(angles)
     frame, column = np.unravel_index(np.argmax(outside), outside.shape)
-    if outside[frame, column] <= NOTED_EXCESS:
-        return []
     name, value = names[limited[column]], angles[frame, column]
     limits = f"{lower[column]:.4g} to {upper[column]:.4g} rad"
     usual = np.median(outside, axis=0)

@@ -18,8 +18,14 @@ ROOT_JOINT = 1
 
 def urdf_order(robot: Robot) -> tuple[str, ...]:
     """The robot's joints in the order of the URDF's text, which the model's need not be."""
-    place = {name: index for index, name in enumerate(_names_in_urdf(robot.urdf))}
-    return tuple(sorted(robot.joints.names, key=lambda name: place.get(name, len(place))))
+    return _in_order(robot.joints.names, _names_in_urdf(robot.urdf))
+
+
+@lru_cache(maxsize=16)
+def _in_order(names: tuple[str, ...], order: tuple[str, ...]) -> tuple[str, ...]:
+    """The names in this order; those that are not in it are last."""
+    place = {name: index for index, name in enumerate(order)}
+    return tuple(sorted(names, key=lambda name: place.get(name, len(place))))
 
 
 def _names_in_urdf(path: Path) -> tuple[str, ...]:

@@ -12,9 +12,6 @@ from dynacom.robots import Robot
 _FAR_FROM_ZERO = 0.1
 # Stances that differ by more than this stand on different levels [m].
 _LEVEL = 0.05
-# A slope is told from this angle [deg] and this difference of heights on [m], if no stance is
-# farther from the plane than this [m] and this part of the difference.
-_SLOPE, _RISE, _PLANE, _PLANE_PART = 1.0, 0.02, 0.02, 0.2
 # A foot that is held in the air is worth a word after so long [s].
 _HELD = 0.5
 # Schedules that differ in more of the frames than this are worth a word.
@@ -31,9 +28,17 @@ def ground_heights(robot: Robot, found: MotionExamination) -> dict[str, float | 
     actives, ground = np.asarray(found.schedule.active), found.ground
     for index, name in enumerate(robot.contacts):
         values = ground[actives[:, index], index]
-        values = values[np.isfinite(values)]
-        heights[name] = float(np.median(values)) if len(values) else None
+        heights[name] = _median(values[np.isfinite(values)])
     return heights
+
+
+def _median(values: np.ndarray) -> float | None:
+    """As NumPy's, which takes thrice as long for a short clip; None of no values."""
+    if not len(values):
+        return None
+    ordered = np.sort(values)
+    middle = len(values) // 2
+    return float(0.5 * (ordered[(len(values) - 1) // 2] + ordered[middle]))
 
 
 def terrain_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
@@ -90,20 +95,10 @@ def _used(found: MotionExamination) -> Iterator[Stance]:
 
 def _slope_text(found: MotionExamination) -> str | None:
     """If the stances lie in a plane that is not level."""
-    points = []
-    positions = [moved.position for moved in found.part_motions]
-    for stance in _used(found):
-        position = positions[stance.part][stance.first : stance.behind]
-        points.append([*position[:, :2].mean(axis=0), stance.height])
-    points = np.array(points).reshape(-1, 3)
-    if len(points) < 6 or np.ptp(points[:, 2]) <= _RISE:
+    gradient = found.inference.slope
+    if not gradient.any():
         return None
-    centred = points - points.mean(axis=0)
-    gradient, *_ = np.linalg.lstsq(centred[:, :2], centred[:, 2], rcond=None)
-    off = centred[:, 2] - centred[:, :2] @ gradient
     angle = np.degrees(np.arctan(np.linalg.norm(gradient)))
-    if angle < _SLOPE or np.abs(off).max() > min(_PLANE, _PLANE_PART * np.ptp(points[:, 2])):
-        return None
     towards = np.degrees(np.arctan2(gradient[1], gradient[0]))
     return (
         f"The ground is a slope of {angle:.1f} degrees, which rises towards {towards:.0f} degrees "

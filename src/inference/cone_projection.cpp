@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace dynacom::internal {
 
@@ -30,30 +31,49 @@ ConeProjection::Vector6 ConeProjection::direction(const Edge& edge, const Eigen:
   return wrench;
 }
 
+void ConeProjection::add(const Edge& edge, const Vector6& column) {
+  edges_[count_] = edge;
+  factors_[count_] = 0.;
+  columns_.col(count_) = column;
+  for (int k = 0; k <= count_; ++k) products_[count_][k] = columns_.col(k).dot(column);
+  pulls_[count_] = column.dot(target_);
+  ++count_;
+}
+
+void ConeProjection::drop(int position) {
+  --count_;
+  for (int k = position; k < count_; ++k) {
+    edges_[k] = edges_[k + 1];
+    factors_[k] = factors_[k + 1];
+    columns_.col(k) = columns_.col(k + 1);
+    pulls_[k] = pulls_[k + 1];
+    for (int i = 0; i <= k; ++i) products_[k][i] = products_[k + 1][i + (i >= position)];
+  }
+}
+
 // The factors of least squares, by Cholesky's decomposition of the normal equations; false if the
 // last edge is within the span of the others.
 bool ConeProjection::solve() {
   std::array<std::array<double, kEdges>, kEdges> L;
-  std::array<double, kEdges> y;
+  std::array<double, kEdges> y, inverse;
   for (int i = 0; i < count_; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      double sum = columns_.col(i).dot(columns_.col(j));
+    double rhs = pulls_[i];
+    for (int j = 0; j < i; ++j) {
+      double sum = products_[i][j];
       for (int k = 0; k < j; ++k) sum -= L[i][k] * L[j][k];
-      if (i == j) {
-        if (!(sum > kDependent)) return false;
-        L[i][i] = std::sqrt(sum);
-      } else {
-        L[i][j] = sum / L[j][j];
-      }
+      L[i][j] = sum * inverse[j];
+      rhs -= L[i][j] * y[j];
     }
-    double rhs = columns_.col(i).dot(target_);
-    for (int k = 0; k < i; ++k) rhs -= L[i][k] * y[k];
-    y[i] = rhs / L[i][i];
+    double sum = products_[i][i];
+    for (int k = 0; k < i; ++k) sum -= L[i][k] * L[i][k];
+    if (!(sum > kDependent)) return false;
+    inverse[i] = 1. / std::sqrt(sum);
+    y[i] = rhs * inverse[i];
   }
   for (int i = count_ - 1; i >= 0; --i) {
     double value = y[i];
     for (int k = i + 1; k < count_; ++k) value -= L[k][i] * solution_[k];
-    solution_[i] = value / L[i][i];
+    solution_[i] = value * inverse[i];
   }
   return true;
 }
@@ -65,15 +85,6 @@ double ConeProjection::lift(std::uint32_t set) const {
   return sum;
 }
 
-void ConeProjection::drop(int position) {
-  for (int k = position + 1; k < count_; ++k) {
-    edges_[k - 1] = edges_[k];
-    factors_[k - 1] = factors_[k];
-    columns_.col(k - 1) = columns_.col(k);
-  }
-  --count_;
-}
-
 ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
                                                  const Eigen::Matrix3Xd& levers,
                                                  const std::vector<double>& mu, std::uint32_t set) {
@@ -81,14 +92,10 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
   const double size = target_.norm();
 
   // What is left of the last answer, as far as its points are there.
-  int kept = 0;
-  for (int k = 0; k < count_; ++k)
-    if (set >> edges_[k].point & 1u) edges_[kept++] = edges_[k];
-  count_ = kept;
-  for (int k = 0; k < count_; ++k) {
-    columns_.col(k) = direction(edges_[k], levers, mu);
-    factors_[k] = 0.;
-  }
+  const std::array<Edge, kEdges> last = edges_;
+  const int edges = std::exchange(count_, 0);
+  for (int k = 0; k < edges; ++k)
+    if (set >> last[k].point & 1u) add(last[k], direction(last[k], levers, mu));
   while (count_ > 0 && !solve()) drop(count_ - 1);
   for (;;) {  // of the old edges only those that push
     const auto least = std::min_element(solution_.begin(), solution_.begin() + count_);
@@ -119,10 +126,7 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
       if (std::find(edges_.begin(), known, edge) == known) best = edge, slope = value;
     }
     if (best.point < 0 || count_ == kEdges) break;
-    edges_[count_] = best;
-    columns_.col(count_) = direction(best, levers, mu);
-    factors_[count_] = 0.;
-    ++count_;
+    add(best, direction(best, levers, mu));
     if (!solve()) {
       drop(count_ - 1);
       break;

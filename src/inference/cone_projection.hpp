@@ -51,8 +51,9 @@ class ConeProjection {
 
   Vector6 direction(const Edge& edge, const Eigen::Matrix3Xd& levers,
                     const std::vector<double>& mu) const;
-  bool solve();
+  void add(const Edge& edge, const Vector6& column);
   void drop(int position);
+  bool solve();
 
   static constexpr int kEdges = 6;  // more do not make a wrench, but for one that is dropped
 
@@ -60,6 +61,8 @@ class ConeProjection {
   int count_ = 0;
   std::array<Edge, kEdges> edges_ = {};
   Eigen::Matrix<double, 6, kEdges> columns_;
+  std::array<std::array<double, kEdges>, kEdges> products_;  // of the columns, below the diagonal
+  std::array<double, kEdges> pulls_;                         // of the columns with the target
   std::array<double, kEdges> factors_ = {};
   std::array<double, kEdges> solution_ = {};
   Vector6 target_;

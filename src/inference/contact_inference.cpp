@@ -9,6 +9,7 @@
 #include "../nan.hpp"
 #include "contact_inference.hpp"
 #include "dynacom/contact_point.hpp"
+#include "ground_slope.hpp"
 #include "schedule_path.hpp"
 
 namespace dynacom {
@@ -22,14 +23,13 @@ constexpr std::size_t kMaximalParts = 32;
 // What forces are parts of where there is no gravity [m/s²].
 constexpr double kStandardGravity = 9.81;
 
-// A contact takes its load on, and gives it back, over so long [s], from and to this readiness.
-constexpr double kRamp = 0.1, kLeastReadiness = 0.3;
-
 // How readily parts bear load: less where their contact has just begun, or is about to end.
-Eigen::MatrixXd findReadiness(const ContactSchedule::Matrix& active, const Eigen::VectorXd& time) {
+Eigen::MatrixXd findReadiness(const ContactSchedule::Matrix& active, const Eigen::VectorXd& time,
+                              const DetectionSettings& settings) {
   Eigen::MatrixXd readiness = Eigen::MatrixXd::Ones(active.rows(), active.cols());
-  const auto ramp = [](double since) {
-    return kLeastReadiness + (1. - kLeastReadiness) * std::clamp(since / kRamp, 0., 1.);
+  const auto ramp = [&](double since) {
+    const double least = settings.ramp_least;
+    return least + (1. - least) * std::clamp(since / settings.ramp, 0., 1.);
   };
   for (Index part = 0; part < active.rows(); ++part) {
     double begin = -std::numeric_limits<double>::infinity(), end = -begin;
@@ -86,6 +86,23 @@ internal::KnownContacts findKnown(const internal::ContactSplit& parts,
         known.active.row(Index(k)) = recorded.active.row(Index(row));
     }
   return known;
+}
+
+// Where contacts stand: the mean place of each stance in which its part is active at some time.
+Eigen::Matrix3Xd findFooting(const ContactInference& found,
+                             const std::vector<internal::PointTrack>& tracks) {
+  std::vector<Eigen::Vector3d> points;
+  for (const Stance& stance : found.stances) {
+    const internal::PointTrack& track = tracks[stance.part];
+    const Index count = stance.behind - stance.first;
+    if (track.is_body || !stance.on_ground ||
+        !found.schedule.active.row(Index(stance.part)).segment(stance.first, count).any())
+      continue;
+    points.push_back(track.position.middleCols(stance.first, count).rowwise().mean());
+    points.back().z() = stance.height;
+  }
+  return Eigen::Map<const Eigen::Matrix3Xd>(points.empty() ? nullptr : points[0].data(), 3,
+                                            Index(points.size()));
 }
 
 }  // namespace
@@ -170,7 +187,8 @@ ContactInference internal::inferContacts(const ContactSplit& parts,
     for (const internal::Rest& rest : rests[k].list)
       found.stances.push_back({k, rest.first, rest.behind, rest.height, rest.on_ground});
   }
-  found.schedule.readiness = findReadiness(found.schedule.active, time);
+  found.slope = internal::findGroundSlope(findFooting(found, tracks));
+  found.schedule.readiness = findReadiness(found.schedule.active, time, settings);
   return found;
 }
 

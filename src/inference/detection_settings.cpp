@@ -38,7 +38,10 @@ const std::vector<DetectionSettings::Constant>& DetectionSettings::constants() {
       {"moving_speed", &DetectionSettings::moving_speed},
       {"horizontal_part", &DetectionSettings::horizontal_part},
       {"rest_duration", &DetectionSettings::rest_duration},
+      {"same_rest_speed", &DetectionSettings::same_rest_speed},
       {"same_rest", &DetectionSettings::same_rest},
+      {"near_movement", &DetectionSettings::near_movement},
+      {"stir_speed", &DetectionSettings::stir_speed},
       {"landing_height", &DetectionSettings::landing_height},
       {"same_ground", &DetectionSettings::same_ground},
       {"exact_same_ground", &DetectionSettings::exact_same_ground},
@@ -68,6 +71,8 @@ const std::vector<DetectionSettings::Constant>& DetectionSettings::constants() {
       {"further_points", &DetectionSettings::further_points},
       {"rate", &DetectionSettings::rate},
       {"change", &DetectionSettings::change},
+      {"ramp", &DetectionSettings::ramp},
+      {"ramp_least", &DetectionSettings::ramp_least},
   };
   return all;
 }
@@ -83,8 +88,10 @@ void DetectionSettings::validate() const {
     internal::requireField(this->*greatest >= this->*least,
                            ("DetectionSettings." + std::string(nameOf(greatest))).c_str(),
                            internal::concat(">= ", nameOf(least)).c_str(), this->*greatest);
-  internal::requireField(further_points <= 1., "DetectionSettings.further_points", "<= 1",
-                         further_points);
+  for (const auto field : {&DetectionSettings::further_points, &DetectionSettings::ramp_least})
+    internal::requireField(this->*field <= 1.,
+                           ("DetectionSettings." + std::string(nameOf(field))).c_str(), "<= 1",
+                           this->*field);
   internal::requireField(!std::isinf(ground_height), "DetectionSettings.ground_height",
                          "finite or NaN", ground_height);
   internal::requireField((ground_velocity.allFinite() && ground_velocity.z() == 0.) ||

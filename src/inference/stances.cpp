@@ -13,11 +13,6 @@ namespace {
 
 using Eigen::Index;
 
-// It does not matter for how long a robot stands before and after a motion, or in between. What
-// counts of its frames are those this close to one in which a point moves [s], in which some point
-// stirs [m/s].
-constexpr double kNearMovement = 0.5;
-constexpr double kStir = 0.01;
 // A normal distribution's standard deviation, in medians of absolute deviations.
 constexpr double kDeviation = 1.4826;
 // How fast a point gets, as a quantile of its speeds.
@@ -40,13 +35,13 @@ Eigen::VectorXd findSpeeds(const PointTrack& point, double horizontal_part) {
 using Frames = Eigen::Array<bool, Eigen::Dynamic, 1>;
 
 Frames findCounting(const std::vector<PointTrack>& points, const Eigen::VectorXd& time,
-                    double moving_speed) {
+                    const DetectionSettings& settings) {
   const Index frames = time.size();
   Frames moves = Frames::Constant(frames, false), stirs = moves;
   for (const PointTrack& point : points) {
     const auto speed = point.velocity.colwise().norm().transpose().array();
-    moves = moves || speed > moving_speed;
-    stirs = stirs || speed > kStir;
+    moves = moves || speed > settings.moving_speed;
+    stirs = stirs || speed > settings.stir_speed;
   }
   if (!stirs.any()) return Frames::Constant(frames, true);
   if (!moves.any()) return stirs;
@@ -54,12 +49,12 @@ Frames findCounting(const std::vector<PointTrack>& points, const Eigen::VectorXd
   double last = -std::numeric_limits<double>::infinity();
   for (Index frame = 0; frame < frames; ++frame) {
     if (moves[frame]) last = time[frame];
-    if (time[frame] - last <= kNearMovement) counts[frame] = stirs[frame];
+    if (time[frame] - last <= settings.near_movement) counts[frame] = stirs[frame];
   }
   last = std::numeric_limits<double>::infinity();
   for (Index frame = frames; frame-- > 0;) {
     if (moves[frame]) last = time[frame];
-    if (last - time[frame] <= kNearMovement) counts[frame] = stirs[frame];
+    if (last - time[frame] <= settings.near_movement) counts[frame] = stirs[frame];
   }
   return counts;
 }
@@ -95,14 +90,14 @@ std::vector<Rest> findRuns(const PointTrack& point, const Frames& counts,
 
 // Makes one of neighbours that are the same rest.
 void mergeRests(const PointTrack& point, const Frames& counts, const Eigen::VectorXd& speed,
-                double slow, double same, std::vector<Rest>& rests) {
+                double not_much_faster, double same, std::vector<Rest>& rests) {
   std::vector<Rest> merged;
   for (const Rest& rest : rests) {
     if (!merged.empty()) {
       Rest& last = merged.back();
       const Index between = rest.first - last.behind;
       const double fastest = between > 0 ? speed.segment(last.behind, between).maxCoeff() : 0.;
-      if (fastest < 3. * slow && std::abs(rest.height - last.height) <= same) {
+      if (fastest < not_much_faster && std::abs(rest.height - last.height) <= same) {
         last = makeRest(point, counts, last.first, rest.behind);
         continue;
       }
@@ -204,7 +199,7 @@ Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
 
 std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen::VectorXd& time,
                              bool exact, const DetectionSettings& settings) {
-  const Frames counts = findCounting(points, time, settings.moving_speed);
+  const Frames counts = findCounting(points, time, settings);
   std::vector<Rests> all(points.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
     const PointTrack& point = points[k];
@@ -219,7 +214,7 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
                    exact ? settings.exact_rest_speed_greatest : settings.rest_speed_greatest);
     std::vector<Rest>& rests = all[k].list;
     rests = findRuns(point, counts, speed, time, slow, settings.rest_duration);
-    mergeRests(point, counts, speed, slow, settings.same_rest, rests);
+    mergeRests(point, counts, speed, settings.same_rest_speed * slow, settings.same_rest, rests);
     all[k].owner = findOwners(rests, speed);
   }
 
@@ -262,7 +257,7 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
 
 CostScales findScales(const std::vector<PointTrack>& points, const std::vector<Rests>& rests,
                       const Eigen::VectorXd& time, const DetectionSettings& settings) {
-  const Frames counts = findCounting(points, time, settings.moving_speed);
+  const Frames counts = findCounting(points, time, settings);
   // Links tell only where no contact does: they roll.
   const auto tells = [&](std::size_t k, bool is_body) {
     const auto& list = rests[k].list;

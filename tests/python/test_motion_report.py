@@ -386,6 +386,16 @@ def test_unexplained_loads_go_with_the_robot(talos, walk):
         assert f"{value:.3g}" in note
 
 
+def test_loads_of_nothing_are_not_told(shared_data, talos):
+    """Who stands still and leans forward lacks nothing to the side but rounding."""
+    report = analyze(shared_data / "cases" / "lean_05cm.npz", talos)
+    (note,) = [note for note in report.summary["notes"] if "load" in note]
+    assert "e-" not in note
+    sideward = report.summary["unexplained"]["force"][1]
+    assert 0.0 < abs(sideward) < 1e-3
+    assert re.search(r"\((-?[\d.]+), 0, (-?[\d.]+)\) N and \(0, (-?[\d.]+), 0\) N m", note), note
+
+
 def test_nothing_unexplained_is_not_mentioned(report):
     assert report.summary["unexplained"]["share"] == 0.0
     assert not any("cannot give" in note for note in report.summary["notes"])

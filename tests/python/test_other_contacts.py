@@ -3,10 +3,12 @@
 
 import copy
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+import pyarrow
 import pytest
 from scipy.optimize import linprog
 
@@ -349,11 +351,11 @@ def test_what_moves_sits_nowhere(robot):
     assert any("Either a contact is missing" in note for note in report.summary["notes"])
 
 
-def test_rows_of_a_batch_have_bodies_and_seats(robot, tmp_path):
+def test_rows_of_a_batch_have_bodies_and_seats(robot, root, tmp_path):
     made = {"kneel": _kneel(robot)[0], "sit": _sit(robot)}
     for name, q in made.items():
         np.savez(tmp_path / f"{name}.npz", t=np.arange(len(q)) / RATE, q=q)
-    table = dynacom.batch(tmp_path, robot).to_pylist()
+    table = dynacom.batch(tmp_path, robot, out=tmp_path / "out", frames=True).to_pylist()
     for row, name in zip(table, made, strict=True):
         summary = dynacom.analyze(tmp_path / f"{name}.npz", robot).summary
         bodies = {body.pop("link"): body for body in row["bodies"]}
@@ -361,6 +363,15 @@ def test_rows_of_a_batch_have_bodies_and_seats(robot, tmp_path):
         assert row["seats"] == summary["seats"]
     assert [bool(row["bodies"]) for row in table] == [True, False]
     assert [bool(row["seats"]) for row in table] == [False, True]
+    # All tables of frames at once, as the manual has it.
+    text = (root / "docs" / "batch.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"### Tables of frames.*?```python\n(.*?)```", text, re.DOTALL)
+    names: dict = {"pyarrow": pyarrow}
+    exec(code.replace("DIR", str(tmp_path / "out")), names)
+    assert names["table"].num_rows == sum(row["frames"] for row in table)
+    forces = names["table"]["body.left_shank.force_z"].to_numpy()
+    assert np.nanmax(forces) > 0.1 * 9.81 * table[0]["mass"]
+    assert np.isnan(forces).sum() == table[1]["frames"]
 
 
 def test_standing_needs_nothing_else(robot):
