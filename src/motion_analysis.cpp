@@ -33,26 +33,20 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by analyzeMotion before initialize()");
   const pinocchio::Model& model = robot.getModel();
-  const Eigen::Index frames = motion.frames();
   const internal::Carrier carrier = internal::describeCarrier(robot);
   internal::DataPool data([&] { return std::make_unique<pinocchio::Data>(model); });
   const internal::MotionSweep sweep(model, carrier.contacts, settings.lanes, data);
   const internal::MotionDistribution distribution(carrier, settings.lanes);
   internal::Workers workers(settings.threads);
-  // Each of the two steps is half of each frame.
-  const auto tell = [&](Eigen::Index before) -> std::function<void(Eigen::Index)> {
-    if (!settings.progress) return nullptr;
-    return [&settings, before](Eigen::Index done) { settings.progress((before + done) / 2); };
-  };
 
   if (!internal::MotionCheck(model).hasSizes(motion)) motion.validate(model);
-  schedule.validate(frames);
+  schedule.validate(motion.frames());
   for (const std::string& name : schedule.names) robot.getContact(name);
   std::vector<ContactMotion> contacts;
   MotionAnalysis analysis;
-  sweep.run(motion, workers, contacts, &analysis, tell(0));
+  sweep.run(motion, workers, contacts, &analysis);
   distribution.run(schedule, contacts, robot.getGroundHeight(), settings, workers, analysis,
-                   tell(frames));
+                   settings.progress);
   return analysis;
 }
 

@@ -2,6 +2,8 @@
 #include "step_speeds.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 #include "configuration_steps.hpp"
 #include "motion_check.hpp"
@@ -16,6 +18,45 @@ double median(Eigen::ArrayXd values) {
   return *middle;
 }
 
+// What moves at a speed of its own: components of a step, and the greatest length that they make
+// in a second.
+struct Part {
+  std::string name;
+  std::vector<Eigen::Index> components;
+  double limit;
+};
+
+// The root's place comes from configurations: the linear part of a step in its tangent space is
+// longer where it turns.
+constexpr Eigen::Index kRootPlace = 0, kRootOrientation = 3;
+
+std::vector<Part> listParts(const pinocchio::Model& model, const Eigen::VectorXd& q,
+                            const VerdictSettings& settings) {
+  std::vector<Part> parts;
+  const bool flies = hasFreeFlyer(model);
+  const auto threeFrom = [](Eigen::Index first) {
+    return std::vector<Eigen::Index>{first, first + 1, first + 2};
+  };
+  if (flies) {
+    parts.push_back({"root", threeFrom(kRootPlace), settings.linear_speed});
+    parts.push_back({"root's orientation", threeFrom(kRootOrientation), settings.turning_speed});
+  }
+  for (std::size_t k = flies ? 2 : 1; k < static_cast<std::size_t>(model.njoints); ++k) {
+    const pinocchio::JointModel& joint = model.joints[k];
+    pinocchio::JointData data = joint.createData();
+    joint.calc(data, q);
+    const Eigen::MatrixXd axes = data.S().matrix();
+    std::vector<Eigen::Index> slides, turns;
+    for (Eigen::Index i = 0; i < joint.nv(); ++i) {
+      const bool is_linear = axes.col(i).tail<3>().isZero(0.);
+      (is_linear ? slides : turns).push_back(joint.idx_v() + i);
+    }
+    if (!slides.empty()) parts.push_back({model.names[k], slides, settings.linear_speed});
+    if (!turns.empty()) parts.push_back({model.names[k], turns, settings.joint_speed});
+  }
+  return parts;
+}
+
 }  // namespace
 
 StepSpeeds measureStepSpeeds(const pinocchio::Model& model, const Eigen::VectorXd& time,
@@ -26,41 +67,29 @@ StepSpeeds measureStepSpeeds(const pinocchio::Model& model, const Eigen::VectorX
   Eigen::ArrayXd durations = time.tail(count) - time.head(count);
   durations = durations.max(median(durations));
 
+  const std::vector<Part> parts = listParts(model, q.col(0), settings);
+  Eigen::MatrixXd steps = ConfigurationSteps(model).compute(q);
+  if (hasFreeFlyer(model))
+    steps.middleRows<3>(kRootPlace) =
+        q.topRows<3>().rightCols(count) - q.topRows<3>().leftCols(count);
   double largest = 0.;
-  const auto take = [&](const std::string& name, const auto& moved, double limit) {
-    const Eigen::ArrayXd speed = moved / (limit * durations);
-    const double own = speed.maxCoeff();
-    if (own > largest) {
-      largest = own;
-      found.fastest = name;
+  for (Eigen::Index step = 0; step < count; ++step) {
+    const auto moved = steps.col(step);
+    double square = 0.;
+    const Part* fastest = nullptr;
+    for (const Part& part : parts) {
+      double own = 0.;
+      for (const Eigen::Index component : part.components)
+        own += moved[component] * moved[component];
+      own /= part.limit * part.limit;
+      if (!(own > square)) continue;
+      square = own;
+      fastest = &part;
     }
-    found.speed = found.speed.max(speed);
-  };
-  const Eigen::MatrixXd steps = ConfigurationSteps(model).compute(q);
-  const auto norms = [](const auto& rows) {
-    return rows.colwise().norm().transpose().array().eval();
-  };
-  const bool flies = hasFreeFlyer(model);
-  if (flies) {  // the linear part of a step in its tangent space is longer where it turns
-    take("root", norms(q.topRows<3>().rightCols(count) - q.topRows<3>().leftCols(count)),
-         settings.linear_speed);
-    take("root's orientation", norms(steps.middleRows<3>(3)), settings.turning_speed);
-  }
-  for (std::size_t k = flies ? 2 : 1; k < static_cast<std::size_t>(model.njoints); ++k) {
-    const pinocchio::JointModel& joint = model.joints[k];
-    pinocchio::JointData data = joint.createData();
-    joint.calc(data, q.col(0));
-    const Eigen::MatrixXd axes = data.S().matrix();
-    Eigen::ArrayXd slides = Eigen::ArrayXd::Zero(count), turns = slides;
-    bool is_prismatic = false, is_revolute = false;
-    for (Eigen::Index i = 0; i < joint.nv(); ++i) {
-      const auto squares = steps.row(joint.idx_v() + i).transpose().array().square();
-      const bool is_linear = axes.col(i).tail<3>().isZero(0.);
-      (is_linear ? slides : turns) += squares;
-      (is_linear ? is_prismatic : is_revolute) = true;
-    }
-    if (is_prismatic) take(model.names[k], slides.sqrt(), settings.linear_speed);
-    if (is_revolute) take(model.names[k], turns.sqrt(), settings.joint_speed);
+    found.speed[step] = std::sqrt(square) / durations[step];
+    if (!(found.speed[step] > largest)) continue;
+    largest = found.speed[step];
+    found.fastest = fastest->name;
   }
   return found;
 }
