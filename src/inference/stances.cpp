@@ -88,41 +88,62 @@ std::vector<Rest> findRuns(const PointTrack& point, const Frames& counts,
   return rests;
 }
 
-// Makes one of neighbours that are the same rest.
+// Makes one of neighbours that are the same rest. While it grows, its height is that of when it was
+// at least this part as long: medians of all frames for each neighbour would take too long.
+constexpr double kStillItsHeight = 0.8;
+
 void mergeRests(const PointTrack& point, const Frames& counts, const Eigen::VectorXd& speed,
                 double not_much_faster, double same, std::vector<Rest>& rests) {
   std::vector<Rest> merged;
+  Index measured = 0;  // until where the last one's height is known
+  const auto measure = [&] {
+    if (!merged.empty() && merged.back().behind != measured)
+      merged.back() = makeRest(point, counts, merged.back().first, merged.back().behind);
+  };
   for (const Rest& rest : rests) {
     if (!merged.empty()) {
       Rest& last = merged.back();
       const Index between = rest.first - last.behind;
       const double fastest = between > 0 ? speed.segment(last.behind, between).maxCoeff() : 0.;
       if (fastest < not_much_faster && std::abs(rest.height - last.height) <= same) {
-        last = makeRest(point, counts, last.first, rest.behind);
+        last.behind = rest.behind;
+        if (double(measured - last.first) < kStillItsHeight * double(last.behind - last.first)) {
+          measure();
+          measured = last.behind;
+        }
         continue;
       }
     }
+    measure();
     merged.push_back(rest);
+    measured = rest.behind;
   }
+  measure();
   rests.swap(merged);
 }
 
 // Until it is fastest between two rests, a point belongs to the first.
 std::vector<int> findOwners(const std::vector<Rest>& rests, const Eigen::VectorXd& speed) {
-  std::vector<int> owner(static_cast<std::size_t>(speed.size()), rests.empty() ? -1 : 0);
-  for (std::size_t k = 1; k < rests.size(); ++k) {
-    const Index from = rests[k - 1].behind, between = rests[k].first - from;
-    Index fastest = 0;
-    if (between > 0) speed.segment(from, between).maxCoeff(&fastest);
-    std::fill(owner.begin() + from + fastest, owner.end(), static_cast<int>(k));
+  std::vector<int> owner(static_cast<std::size_t>(speed.size()), -1);
+  Index first = 0;
+  for (std::size_t k = 0; k < rests.size(); ++k) {
+    Index behind = speed.size();
+    if (k + 1 < rests.size()) {
+      const Index from = rests[k].behind, between = rests[k + 1].first - from;
+      Index fastest = 0;
+      if (between > 0) speed.segment(from, between).maxCoeff(&fastest);
+      behind = from + fastest;
+    }
+    std::fill(owner.begin() + first, owner.begin() + behind, static_cast<int>(k));
+    first = behind;
   }
   return owner;
 }
 
-// How far a point was above a rest since it was last as low, or will be until it is as low again.
-double rise(const PointTrack& point, const std::vector<Rest>& rests, std::size_t k, int direction,
-            double same) {
-  double highest = -std::numeric_limits<double>::infinity();
+// Whether a point was so high above a rest since it was last as low, or will be until it is as low
+// again.
+bool rises(const PointTrack& point, const std::vector<Rest>& rests, std::size_t k, int direction,
+           double same, double rise) {
   const double height = rests[k].height;
   for (auto other = std::ptrdiff_t(k);; other += direction) {
     // From one rest to the next one in this direction, or the end of the motion.
@@ -137,12 +158,12 @@ double rise(const PointTrack& point, const std::vector<Rest>& rests, std::size_t
       from = ends ? 0 : rests[static_cast<std::size_t>(next)].behind;
       behind = rest.first;
     }
-    if (behind > from)
-      highest = std::max(highest, point.position.row(2).segment(from, behind - from).maxCoeff());
-    if (ends || rests[static_cast<std::size_t>(next)].height <= height + same) break;
-    highest = std::max(highest, rests[static_cast<std::size_t>(next)].height);
+    if (behind > from &&
+        point.position.row(2).segment(from, behind - from).maxCoeff() >= height + rise)
+      return true;
+    if (ends || rests[static_cast<std::size_t>(next)].height <= height + same) return false;
+    if (rests[static_cast<std::size_t>(next)].height >= height + rise) return true;
   }
-  return highest - height;
 }
 
 // Velocities of which the ground may have one are counted in squares of this size [m/s].
@@ -235,8 +256,8 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
       if (points[k].is_body) continue;
       lowest_contact = std::min(lowest_contact, rest.height);
       for (const int direction : {-1, 1})
-        if (rise(points[k], all[k].list, i, direction, settings.same_rest) >=
-            settings.landing_height)
+        if (rises(points[k], all[k].list, i, direction, settings.same_rest,
+                  settings.landing_height))
           rest.on_ground = true;
       if (rest.on_ground) levels.push_back(rest.height);
     }
