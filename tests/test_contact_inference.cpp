@@ -54,12 +54,12 @@ struct Puppet {
   }
 
   ContactInference infer(const Motion& motion, const DetectionSettings& settings = {},
-                         const ContactSchedule* recorded = nullptr) const {
+                         const ContactSchedule* recorded = nullptr, bool exact = true) const {
     const auto motions = computeContactMotions(split->robot, motion);
     ContactSchedule none;
     none.active.resize(0, motion.frames());
-    return inferContacts(*split, motions, analyzeMotion(split->robot, motion, none), true, settings,
-                         recorded);
+    return inferContacts(*split, motions, analyzeMotion(split->robot, motion, none), exact,
+                         settings, recorded);
   }
 
   ContactSchedule gather(const ContactInference& found) const {
@@ -116,8 +116,8 @@ BOOST_AUTO_TEST_CASE(it_does_not_matter_for_how_long_who_has_moved_stands_still)
   for (Index frame = 0; frame < frames; ++frame)
     for (const Index foot : {9, 12}) {
       const double phase = 0.7 * double(frame) + double(foot);
-      motion.q(foot, frame) += 0.002 * std::sin(phase) + 0.0001 * double(frames - frame) / 3.;
-      motion.v(foot - 1, frame) += 0.002 * 70. * std::cos(phase);
+      motion.q(foot, frame) += 0.0003 * std::sin(phase) + 1e-5 * double(frames - frame);
+      motion.v(foot - 1, frame) += 0.0003 * 70. * std::cos(phase);
     }
   const Index still = 2000;
   Motion longer{VectorXd::LinSpaced(frames + 2 * still, 0., 0.01 * double(frames + 2 * still - 1)),
@@ -127,11 +127,17 @@ BOOST_AUTO_TEST_CASE(it_does_not_matter_for_how_long_who_has_moved_stands_still)
   longer.q << motion.q.col(0).replicate(1, still), motion.q,
       motion.q.col(frames - 1).replicate(1, still);
   longer.v.middleCols(still, frames) = motion.v;
-  const ContactInference alone = puppet.infer(motion), between = puppet.infer(longer);
+  const ContactInference alone = puppet.infer(motion, {}, nullptr, false);
+  const ContactInference between = puppet.infer(longer, {}, nullptr, false);
   BOOST_TEST(
       (alone.schedule.active.array() == between.schedule.active.middleCols(still, frames).array())
           .all());
-  BOOST_TEST(close(between.ground.middleCols(still, frames), alone.ground, 1e-3));
+  const MatrixXd ground = between.ground.middleCols(still, frames);
+  // A foot that is held in the air has none.
+  BOOST_TEST((ground.array().isNaN() == alone.ground.array().isNaN()).all());
+  const MatrixXd off = ground.array().isNaN().select(0., ground - alone.ground);
+  BOOST_TEST(off.cwiseAbs().maxCoeff() < 1e-4);
+  BOOST_TEST(alone.ground.leftCols(100).allFinite());
   BOOST_TEST(between.schedule.active.leftCols(still - 30).all());
   BOOST_TEST(between.schedule.active.rightCols(still - 30).all());
 }

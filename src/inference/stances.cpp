@@ -220,7 +220,9 @@ Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
 
 std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen::VectorXd& time,
                              bool exact, const DetectionSettings& settings) {
-  const Frames counts = findCounting(points, time, settings);
+  // Where exact motions stand, nothing stirs, and all heights are the same.
+  const Frames counts =
+      exact ? Frames::Constant(time.size(), true) : findCounting(points, time, settings);
   std::vector<Rests> all(points.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
     const PointTrack& point = points[k];
