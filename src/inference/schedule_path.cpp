@@ -166,6 +166,13 @@ class PathFinder {
     return 0.5 * (time_[std::min(frame + 1, last)] - time_[std::max<Index>(frame - 1, 0)]);
   }
 
+  // How probable a change is in such a time, beside what its cost says.
+  static double partOf(double time) { return std::min(time / kChangeTime, 1.); }
+  // What costs no more is not worth looking for: a hundredth of a change of contact in kChangeTime.
+  float negligible(Index frame) const {
+    return kNegligible * float(duration(frame) / kChangeTime);
+  }
+
   double cost(std::size_t point, Index frame) const;
   void makeLevels(Index frame, Levels& levels);
   void makeSets(Index frame, FrameSets& sets);
@@ -178,6 +185,7 @@ class PathFinder {
   }
   float changeOf(Mask before, Mask after) const;
 
+  bool isDetourProbable(Index frame, float gap) const;
   Choice choose(Index frame);
   Choice chooseAmongAll(Index frame);
   std::vector<bool> chooseCertain();
@@ -398,6 +406,15 @@ Choice PathFinder::chooseAmongAll(Index frame) {
   return choice;
 }
 
+// Whether a path may leave a set and come back to it, and be elsewhere in a frame, if another set
+// costs so much more in each frame: the sum over all beginnings and ends of such a detour.
+bool PathFinder::isDetourProbable(Index frame, float gap) const {
+  const double change = partOf(duration(frame)) * std::exp(-double(changes_.least()));
+  const double stay = std::exp(-double(gap));
+  const double end = change / (1. - stay);
+  return !(stay * end * end < std::exp(-double(kImprobable)));
+}
+
 // Writes the sets of the frames that every cheapest path passes, and says which these are.
 //
 // Where frames have the same cheapest set Y, one after the other, paths that are once in Y stay
@@ -423,10 +440,8 @@ std::vector<bool> PathFinder::chooseCertain() {
     if (!(ratio >= 2.f)) continue;
     float since = 0.f, until = 0.f;
     for (std::size_t frame = first; frame < behind; ++frame) {
-      const double part = duration(Index(frame)) / kChangeTime;
-      const double there_and_back = 2. * (changes_.least() - std::log(part));
       certain[frame] = (since += gaps[frame]) >= kImprobable &&
-                       double(gaps[frame]) + there_and_back >= kImprobable;
+                       !isDetourProbable(Index(frame), gaps[frame]);
     }
     for (std::size_t frame = behind; frame-- > first && until < kImprobable;)
       if ((until += gaps[frame]) < kImprobable) certain[frame] = false;
