@@ -228,13 +228,13 @@ class AllPaths {
   }
 
   /// How probable it is that limbs change in the time from one frame to the next, beyond what the
-  /// costs say, which hold for a sixtieth of a second: of each that does, in proportion.
+  /// costs say, which hold for a sixtieth of a second and more: of each that does, in proportion.
   double chance(Index frame, Mask before, Mask after) const {
     double product = 1.;
     for (int limb = 0; limb < limbs(); ++limb)
       for (std::size_t k = 0; k < problem_.limbs.size(); ++k)
         if (problem_.limbs[k] == limb && ((before ^ after) >> k & 1u)) {
-          product *= 60. * (problem_.time[frame] - problem_.time[frame - 1]);
+          product *= std::min(1., 60. * (problem_.time[frame] - problem_.time[frame - 1]));
           break;
         }
     return product;

@@ -19,14 +19,15 @@ using Mask = std::uint32_t;
 
 // How many sets there may be in a frame. More are made fewer, see FrameSets.
 constexpr std::size_t kMaximalSets = 256;
-// What costs no more than this is not worth looking for: it is a hundredth of a change of contact.
-constexpr double kNegligible = 0.05;
-// Sets are probable from here on; and those that cost this much more than the cheapest are not.
-constexpr double kProbable = 0.005, kImprobable = 6.;
-
-// A change of contact is as probable as its cost says in so long a time [s], and in a shorter frame
-// the less.
+// A change of contact is as probable as its cost says in so long a time [s], in a longer one, too,
+// and in a shorter one the less. What the path pays for it hangs on no time.
 constexpr double kChangeTime = 1. / 60.;
+// What costs no more than this in kChangeTime is not worth looking for: a hundredth of a change.
+constexpr float kNegligible = 0.05f;
+// From which probability on it is worth knowing what a set is missing.
+constexpr float kProbable = 0.005f;
+// Costs that are larger by this make a set improbable.
+constexpr float kImprobable = 6.f;
 
 // So many points of a limb, with what it costs that they are active where they are.
 struct Level {
@@ -169,9 +170,7 @@ class PathFinder {
   // How probable a change is in such a time, beside what its cost says.
   static double partOf(double time) { return std::min(time / kChangeTime, 1.); }
   // What costs no more is not worth looking for: a hundredth of a change of contact in kChangeTime.
-  float negligible(Index frame) const {
-    return kNegligible * float(duration(frame) / kChangeTime);
-  }
+  float negligible(Index frame) const { return kNegligible * float(duration(frame) / kChangeTime); }
 
   double cost(std::size_t point, Index frame) const;
   void makeLevels(Index frame, Levels& levels);
@@ -179,7 +178,7 @@ class PathFinder {
   Eigen::Vector2d project(Index frame, Mask set);
   float costOf(const Eigen::Vector2d& missing, Index frame) const;
   float leastCostOf(const Eigen::Vector2d& missing, Index frame) const;
-  void learn(FrameSets& sets, Index frame, std::size_t number) {
+  void evaluate(FrameSets& sets, Index frame, std::size_t number) {
     const Eigen::Vector2d missing = project(frame, sets.mask[number]);
     sets.setMissing(number, costOf(missing, frame), leastCostOf(missing, frame));
   }
@@ -191,7 +190,7 @@ class PathFinder {
   std::vector<bool> chooseCertain();
 
   void findBetween(Index first, Index behind);
-  bool look(FrameSets& sets, Index frame, std::size_t number);
+  bool refine(FrameSets& sets, Index frame, std::size_t number);
   std::vector<std::size_t> findCheapestPath(std::size_t count);
   bool findProbability(Index first, Index behind);
 
@@ -370,8 +369,12 @@ Choice PathFinder::choose(Index frame) {
   }
   found_.missing.col(frame) = project(frame, choice.set);
   float excess = costOf(found_.missing.col(frame), frame);
-  if (excess > kNegligible && all != choice.set) excess -= leastCostOf(project(frame, all), frame);
-  if (all == choice.set || excess <= kNegligible) excess = 0.f;
+  if (!std::isfinite(excess)) return {choice.set, 0.f, 0.f};
+  if (excess > negligible(frame) && all != choice.set)
+    excess -= leastCostOf(project(frame, all), frame);
+  // A subset of all points may trade force for moment, and so cost less than all of them, which can
+  // be no more than hundredths.
+  if (all == choice.set || excess <= negligible(frame)) excess = 0.f;
   choice.ratio = choice.gap;
   for (const std::vector<Level>& limb : levels) {
     const auto own = cheapest(limb);
@@ -388,10 +391,10 @@ Choice PathFinder::choose(Index frame) {
 Choice PathFinder::chooseAmongAll(Index frame) {
   FrameSets& sets = one_;
   makeSets(frame, sets);
-  learn(sets, frame, sets.size() - 1);
+  evaluate(sets, frame, sets.size() - 1);
   std::size_t best = sets.findCheapest();
   while (!sets.is_known[best]) {
-    learn(sets, frame, best);
+    evaluate(sets, frame, best);
     best = sets.findCheapest();
   }
   found_.missing.col(frame) = project(frame, sets.mask[best]);
@@ -440,8 +443,8 @@ std::vector<bool> PathFinder::chooseCertain() {
     if (!(ratio >= 2.f)) continue;
     float since = 0.f, until = 0.f;
     for (std::size_t frame = first; frame < behind; ++frame) {
-      certain[frame] = (since += gaps[frame]) >= kImprobable &&
-                       !isDetourProbable(Index(frame), gaps[frame]);
+      certain[frame] =
+          (since += gaps[frame]) >= kImprobable && !isDetourProbable(Index(frame), gaps[frame]);
     }
     for (std::size_t frame = behind; frame-- > first && until < kImprobable;)
       if ((until += gaps[frame]) < kImprobable) certain[frame] = false;
@@ -479,7 +482,7 @@ void PathFinder::findBetween(Index first, Index behind) {
     path = findCheapestPath(count);
     is_done = true;
     forEach([&](FrameSets& sets, Index frame) {
-      if (look(sets, frame, path[static_cast<std::size_t>(frame - from)])) is_done = false;
+      if (refine(sets, frame, path[static_cast<std::size_t>(frame - from)])) is_done = false;
     });
   }
   forEach([&](FrameSets& sets, Index frame) {
@@ -493,14 +496,14 @@ void PathFinder::findBetween(Index first, Index behind) {
 
 // Computes what a set is missing, and if that is something, what those are that may be better; says
 // whether that was new.
-bool PathFinder::look(FrameSets& sets, Index frame, std::size_t number) {
+bool PathFinder::refine(FrameSets& sets, Index frame, std::size_t number) {
   if (sets.is_known[number]) return false;
-  learn(sets, frame, number);
-  if (sets.missing[number] <= kNegligible) return true;
-  if (!sets.is_known.back()) learn(sets, frame, sets.size() - 1);
+  evaluate(sets, frame, number);
+  if (sets.missing[number] <= negligible(frame)) return true;
+  if (!sets.is_known.back()) evaluate(sets, frame, sets.size() - 1);
   for (std::size_t other = sets.size(); other-- > 0;) {
     if (sets.is_known[other]) continue;
-    if (sets.total(other) < sets.total(number)) learn(sets, frame, other);
+    if (sets.total(other) < sets.total(number)) evaluate(sets, frame, other);
   }
   return true;
 }
@@ -582,7 +585,7 @@ bool PathFinder::findProbability(Index first, Index behind) {
   const auto move = [&](std::vector<float>& value, std::size_t k, std::size_t to_k) {
     const FrameSets &before = between_[k], &after = between_[to_k];
     const Index frame = first + Index(std::min(k, to_k));
-    const auto part = float((time_[frame + 1] - time_[frame]) / kChangeTime);
+    const auto part = float(partOf(time_[frame + 1] - time_[frame]));
     std::size_t below = 1, above = before.size();
     for (std::size_t limb = 0; limb < after.levels.size(); ++limb) {
       const std::vector<Level>&from = before.levels[limb], &to = after.levels[limb];
@@ -636,7 +639,7 @@ bool PathFinder::findProbability(Index first, Index behind) {
       for (Mask rest = sets.mask[number]; rest != 0; rest &= rest - 1)
         probability[__builtin_ctz(rest)] += double(value);
       if (value > kProbable && !sets.is_known[number]) {
-        learn(sets, frame, number);
+        evaluate(sets, frame, number);
         is_new = true;
       }
     }
