@@ -12,12 +12,11 @@
 #include "dynacom/motion.hpp"
 #include "motion_check.hpp"
 #include "nan.hpp"
+#include "standard_gravity.hpp"
 
 namespace dynacom {
 
 namespace {
-
-constexpr double kStandardGravity = 9.81;
 
 // A difference of sixth order takes so many frames. Of higher orders, what a smooth motion leaves
 // is less, but there are more frames in which a contact may begin.
@@ -109,7 +108,7 @@ double internal::estimateAccelerationNoise(const pinocchio::Model& model,
     std::nth_element(axis.begin(), quartile, axis.end());
     square += *quartile * *quartile;
   }
-  return std::sqrt(square) / kQuartile / kStandardGravity;
+  return std::sqrt(square) / kQuartile / internal::kStandardGravity;
 }
 
 double estimateAccelerationNoise(const pinocchio::Model& model, const Eigen::VectorXd& time,

@@ -10,6 +10,7 @@
 #include "check.hpp"
 #include "contact_frame.hpp"
 #include "nan.hpp"
+#include "standard_gravity.hpp"
 #include "urdf.hpp"
 
 namespace dynacom {
@@ -21,8 +22,6 @@ using internal::throwInvalid;
 
 namespace {
 
-// Turns a mass into the force that distributions are compared with, whatever gravity is [m/s²].
-constexpr double kStandardGravity = 9.81;
 // By what part sums of the same masses may differ.
 constexpr double kSameMass = 1e-9;
 
@@ -336,7 +335,7 @@ DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForc
   }
   Vector6 wrench;
   wrench << groundCoMForce, groundCoMTorque;
-  distribution_.solve(wrench, mass_ * kStandardGravity);
+  distribution_.solve(wrench, mass_ * internal::kStandardGravity);
 
   const DistributionResult& result = distribution_.result();
   for (std::size_t k = 0; k < result.contacts.size(); ++k)

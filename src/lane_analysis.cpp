@@ -276,8 +276,8 @@ std::optional<LaneCarrier> LaneCarrier::make(const Carrier& carrier, int lanes) 
   return made;
 }
 
-LaneSharer::LaneSharer(const LaneCarrier& carrier, double ground_height,
-                       bool flat_horizontal_ground)
+LaneDistributor::LaneDistributor(const LaneCarrier& carrier, double ground_height,
+                                 bool flat_horizontal_ground)
     : interface_(*carrier.interface_),
       worker_(nullptr, interface_.destroy_sharer),
       rows_(carrier.contacts_.size()),
@@ -290,9 +290,9 @@ LaneSharer::LaneSharer(const LaneCarrier& carrier, double ground_height,
   if (!worker_) throw std::bad_alloc();
 }
 
-void LaneSharer::run(Eigen::Index first, Eigen::Index frames,
-                     const std::vector<ContactMotion>& contacts, const Eigen::MatrixXd& readiness,
-                     MotionAnalysis& result) {
+void LaneDistributor::run(Eigen::Index first, Eigen::Index frames,
+                          const std::vector<ContactMotion>& contacts,
+                          const Eigen::MatrixXd& readiness, MotionAnalysis& result) {
   answered_.resize(frames);
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     MotionAnalysis::Contact& contact = result.contacts[k];
@@ -309,18 +309,18 @@ void LaneSharer::run(Eigen::Index first, Eigen::Index frames,
     rows.yaw_usage = contact.yaw_usage.data() + first;
     rows.cop_margin = contact.cop_margin.data() + first;
   }
-  lanes::Shares shares = {};
-  shares.count = frames;
-  shares.com = columnOf(result.com, first);
-  shares.force = columnOf(result.ground_force, first);
-  shares.torque = columnOf(result.ground_torque, first);
-  shares.cop = columnOf(result.cop, first);
-  shares.feasible_acom = columnOf(result.feasible_acom, first);
-  shares.feasible_dam = columnOf(result.feasible_dam, first);
-  shares.residual = columnOf(result.residual, first);
-  shares.contacts = rows_.data();
-  shares.answered = answered_.data();
-  interface_.share(worker_.get(), &shares);
+  lanes::Distributions distributions = {};
+  distributions.count = frames;
+  distributions.com = columnOf(result.com, first);
+  distributions.force = columnOf(result.ground_force, first);
+  distributions.torque = columnOf(result.ground_torque, first);
+  distributions.cop = columnOf(result.cop, first);
+  distributions.feasible_acom = columnOf(result.feasible_acom, first);
+  distributions.feasible_dam = columnOf(result.feasible_dam, first);
+  distributions.residual = columnOf(result.residual, first);
+  distributions.contacts = rows_.data();
+  distributions.answered = answered_.data();
+  interface_.distribute(worker_.get(), &distributions);
 }
 
 }  // namespace dynacom::internal

@@ -67,7 +67,7 @@ class LaneCarrier {
   static std::optional<LaneCarrier> make(const Carrier& carrier, int lanes);
 
  private:
-  friend class LaneSharer;
+  friend class LaneDistributor;
   LaneCarrier() = default;
 
   const lanes::Interface* interface_ = nullptr;
@@ -77,12 +77,12 @@ class LaneCarrier {
 };
 
 /// How contacts share what a motion needs, as long as no inequality is active.
-class LaneSharer {
+class LaneDistributor {
  public:
   /// @param ground_height           for the centre of pressure on flat ground [m]
   /// @param flat_horizontal_ground  as AnalysisSettings::flat_horizontal_ground
   /// @throws std::bad_alloc
-  LaneSharer(const LaneCarrier& carrier, double ground_height, bool flat_horizontal_ground);
+  LaneDistributor(const LaneCarrier& carrier, double ground_height, bool flat_horizontal_ground);
 
   /// @param contacts   how they lie
   /// @param readiness  of the contacts, frames × contacts, or nothing; see ContactSchedule

@@ -464,31 +464,31 @@ void Sweeper::place(const Fixture& contact, const PlaceRows& rows) const {
 
 // ---- How contacts share a wrench ----
 
-class Sharer : Block {
+class Distributor : Block {
  public:
-  explicit Sharer(const Carrier& carrier)
+  explicit Distributor(const Carrier& carrier)
       : carrier_(carrier),
         contacts_(carrier.contact, carrier.contact + carrier.contacts),
         standing_(contacts_.size()) {}
 
-  void run(const Shares& shares) {
-    for (std::ptrdiff_t first = 0; first < shares.count; first += kLanes) {
-      take(first, shares.count);
-      com_ = loadVector(shares.com);
-      force_ = loadVector(shares.force);
-      torque_ = loadVector(shares.torque);
+  void run(const Distributions& distributions) {
+    for (std::ptrdiff_t first = 0; first < distributions.count; first += kLanes) {
+      take(first, distributions.count);
+      com_ = loadVector(distributions.com);
+      force_ = loadVector(distributions.force);
+      torque_ = loadVector(distributions.torque);
       const Lanes wrench[6] = {force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z};
       for (int i = 0; i < 6; ++i) wrench_[i] = wrench[i];
       bool any = false;
       for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        stand(shares.contacts[k], standing_[k]);
+        stand(distributions.contacts[k], standing_[k]);
         any = any || standing_[k].takes_part;
       }
-      if (carrier_.flat_horizontal_ground) findCentreOfPressure(shares);
+      if (carrier_.flat_horizontal_ground) findCentreOfPressure(distributions);
       if (any)
-        distribute(shares);
+        distribute(distributions);
       else
-        store(shares.answered, Mask(false));
+        store(distributions.answered, Mask(false));
     }
   }
 
@@ -504,10 +504,10 @@ class Sharer : Block {
   };
 
   void stand(const ContactRows& rows, Standing& standing) const;
-  void findCentreOfPressure(const Shares& shares) const;
+  void findCentreOfPressure(const Distributions& distributions) const;
   Mask findForces();
-  void distribute(const Shares& shares);
-  void storeContact(const Shares& shares, std::size_t k, const Mask& answered) const;
+  void distribute(const Distributions& distributions);
+  void storeContact(const Distributions& distributions, std::size_t k, const Mask& answered) const;
 
   const Carrier carrier_;
   const std::vector<Contact> contacts_;
@@ -518,7 +518,7 @@ class Sharer : Block {
   Lanes wrench_[6], achieved_[6];
 };
 
-void Sharer::stand(const ContactRows& rows, Standing& standing) const {
+void Distributor::stand(const ContactRows& rows, Standing& standing) const {
   bool any = false;
   for (int lane = 0; lane < count_; ++lane) any = any || rows.active[first_ + lane];
   standing.takes_part = any;
@@ -541,19 +541,19 @@ void Sharer::stand(const ContactRows& rows, Standing& standing) const {
 }
 
 // The centre of pressure (5).
-void Sharer::findCentreOfPressure(const Shares& shares) const {
+void Distributor::findCentreOfPressure(const Distributions& distributions) const {
   const Lanes height = com_.z - carrier_.ground_height;
   Lanes x = com_.x + (-torque_.y - force_.x * height) / force_.z;
   Lanes y = com_.y + (torque_.x - force_.y * height) / force_.z;
   const Mask undefined = !(force_.z >= carrier_.minimal_vertical_force) || !(0. * (x + y) == 0.);
   stdx::where(undefined, x) = kNaN;
   stdx::where(undefined, y) = kNaN;
-  store(shares.cop, {x, y});
+  store(distributions.cop, {x, y});
 }
 
 // The cheapest forces that give the wrench, whatever inequalities say: the multipliers ν solve
 // NE W⁻² NEᵀ ν = w, and λ = W⁻² NEᵀ ν. Says where all inequalities hold.
-Mask Sharer::findForces() {
+Mask Distributor::findForces() {
   const double* D = carrier_.wrench_weights;
   Factors factors;
   Lanes compliance[6][6];
@@ -643,19 +643,19 @@ Mask Sharer::findForces() {
   return answered && distance <= kMissing * kMissing * size;
 }
 
-void Sharer::distribute(const Shares& shares) {
+void Distributor::distribute(const Distributions& distributions) {
   const Mask answered = findForces();
-  store(shares.answered, answered);
+  store(distributions.answered, answered);
   const Lanes inverse_mass = 1. / carrier_.mass;
   const Vector acom =
       inverse_mass * Vector{achieved_[0], achieved_[1], achieved_[2]} + broadcast(carrier_.gravity);
-  store(shares.feasible_acom, acom);
-  store(shares.feasible_dam, Vector{achieved_[3], achieved_[4], achieved_[5]});
+  store(distributions.feasible_acom, acom);
+  store(distributions.feasible_dam, Vector{achieved_[3], achieved_[4], achieved_[5]});
   Lanes residual[6];
   for (int i = 0; i < 6; ++i) residual[i] = wrench_[i] - achieved_[i];
-  store(shares.residual, residual);
+  store(distributions.residual, residual);
   for (std::size_t k = 0; k < contacts_.size(); ++k)
-    if (standing_[k].takes_part) storeContact(shares, k, answered);
+    if (standing_[k].takes_part) storeContact(distributions, k, answered);
 
   if (carrier_.flat_horizontal_ground) return;
   // The mean of the contacts' own centres of pressure, weighted by their vertical forces (6).
@@ -678,14 +678,15 @@ void Sharer::distribute(const Shares& shares) {
       !(vertical_force >= carrier_.minimal_vertical_force) || !(0. * (x + y) == 0.);
   stdx::where(undefined, x) = kNaN;
   stdx::where(undefined, y) = kNaN;
-  store(shares.cop, {x, y});
+  store(distributions.cop, {x, y});
 }
 
 // As ContactBase and DynaCoM have it.
-void Sharer::storeContact(const Shares& shares, std::size_t k, const Mask& answered) const {
+void Distributor::storeContact(const Distributions& distributions, std::size_t k,
+                               const Mask& answered) const {
   const Contact& contact = contacts_[k];
   const Standing& standing = standing_[k];
-  const ContactRows& rows = shares.contacts[k];
+  const ContactRows& rows = distributions.contacts[k];
   const Lanes* f = standing.force;
   const Matrix& R = standing.rotation;
   const Mask written = answered && standing.is_active > 0.;
@@ -737,9 +738,9 @@ constexpr Interface kInterface = {kVersion,
                                   &create<Sweeper, Robot>,
                                   &run<Sweeper, Sweep>,
                                   &destroy<Sweeper>,
-                                  &create<Sharer, Carrier>,
-                                  &run<Sharer, Shares>,
-                                  &destroy<Sharer>};
+                                  &create<Distributor, Carrier>,
+                                  &run<Distributor, Distributions>,
+                                  &destroy<Distributor>};
 
 }  // namespace
 }  // namespace dynacom::lanes

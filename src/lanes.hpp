@@ -99,7 +99,7 @@ struct ContactRows {
 
 /// Wrenches about CoMs, one behind the other, and where it goes how contacts share them; see
 /// MotionAnalysis. What is not answered may have been written all the same.
-struct Shares {
+struct Distributions {
   std::ptrdiff_t count;
   const double *com, *force, *torque;
   double* cop;
@@ -118,7 +118,7 @@ struct Interface {
   void (*destroy_sweeper)(void* sweeper);
   /// The same for a carrier.
   void* (*create_sharer)(const Carrier* carrier);
-  void (*share)(void* sharer, const Shares* shares);
+  void (*distribute)(void* distributor, const Distributions* distributions);
   void (*destroy_sharer)(void* sharer);
 };
 

@@ -7,13 +7,11 @@
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "nan.hpp"
+#include "standard_gravity.hpp"
 
 namespace dynacom::internal {
 
 namespace {
-
-// Turns a mass into the force that distributions are compared with, whatever gravity is [m/s²].
-constexpr double kStandardGravity = 9.81;
 
 // √(g / mean height of the CoM above the ground), the natural frequency of the pendulum.
 double computeOmega(const Eigen::Matrix3Xd& com, double gravity, double ground_height) {
@@ -137,7 +135,7 @@ class MotionDistribution::Worker {
   const double ground_height_;
   const bool flat_;
   MotionAnalysis& result_;
-  std::optional<LaneSharer> lanes_;
+  std::optional<LaneDistributor> lanes_;
   // For what the lanes leave, as soon as there is any.
   std::shared_ptr<Solver> solver_;
   bool is_cold_ = true;           // whether it has done nothing in this block

@@ -11,6 +11,7 @@
 #include "body_screening.hpp"
 #include "check.hpp"
 #include "contact_split.hpp"
+#include "inference/cone_projection.hpp"
 #include "inference/contact_inference.hpp"
 #include "motion_derivation.hpp"
 #include "motion_distribution.hpp"
@@ -18,6 +19,7 @@
 #include "motion_sweep.hpp"
 #include "nan.hpp"
 #include "seat_search.hpp"
+#include "standard_gravity.hpp"
 #include "support_meter.hpp"
 
 namespace dynacom {
@@ -118,12 +120,8 @@ constexpr double kMuch = 0.02;
 // Who sits lacks more than this [m g], [m g m], where the seat is not known; who leans lacks less.
 constexpr double kSeated = 0.1;
 
-// How many points there may be at most, see inferContacts().
-constexpr std::size_t kMaximalParts = 32;
-
 // A set whose forces lack less than this gives all that is needed [m g], [m g m].
 constexpr double kGiven = 1e-3;
-constexpr double kStandardGravity = 9.81;
 
 // A motion, what it needs, and how contacts and their parts lie and move in it.
 struct SweptMotion {
@@ -138,8 +136,8 @@ Mask findMissing(const ContactSplit& split, const SweptMotion& swept,
                  const ContactInference& inference, const Mask& unsure,
                  const VerdictSettings& settings) {
   const double gravity = -split.carrier.gravity.z();
-  const double unit = gravity > 0. ? gravity / kStandardGravity : 1.;
-  const double weight = split.carrier.mass * kStandardGravity;
+  const double unit = gravity > 0. ? gravity / internal::kStandardGravity : 1.;
+  const double weight = split.carrier.mass * internal::kStandardGravity;
   internal::SupportMeter support(split.carrier, swept.parts, swept.analysis);
   const auto isMissing = [&](Eigen::Index frame) {
     const double force = unit * inference.missing(0, frame);
@@ -205,8 +203,8 @@ std::vector<internal::FixedContact> listAll(const DynaCoM& robot, const ContactS
 }  // namespace
 
 /// What is kept from one motion to the next.
-struct MotionExaminer::Office {
-  Office(const DynaCoM& given, const ExaminationSettings& given_settings)
+struct MotionExaminer::Workspace {
+  Workspace(const DynaCoM& given, const ExaminationSettings& given_settings)
       : robot(given),
         settings(given_settings),
         names(robot.getKnownContacts()),
@@ -230,14 +228,18 @@ struct MotionExaminer::Office {
   internal::Workers workers;
 
  private:
-  class Case;
+  class Pipeline;
 };
 
 // One motion. Its steps stand in the order in which they are taken.
-class MotionExaminer::Office::Case {
+class MotionExaminer::Workspace::Pipeline {
  public:
-  Case(Office& office, const RecordedMotion& recorded, const std::function<void(double)>& progress)
-      : office_(office), recorded_(recorded), settings_(office.settings), progress_(progress) {}
+  Pipeline(Workspace& workspace, const RecordedMotion& recorded,
+           const std::function<void(double)>& progress)
+      : workspace_(workspace),
+        recorded_(recorded),
+        settings_(workspace.settings),
+        progress_(progress) {}
 
   MotionExamination examine() {
     MotionExamination found = {};
@@ -245,7 +247,7 @@ class MotionExaminer::Office::Case {
     const std::vector<double> cutoffs = findOtherCutoffs(found.derived);
     passes_ = 2. + 2. * double(cutoffs.size());
     if (recorded_.schedule)
-      for (const std::string& name : recorded_.schedule->names) office_.robot.getContact(name);
+      for (const std::string& name : recorded_.schedule->names) workspace_.robot.getContact(name);
     SweptMotion swept = sweep(found.derived.motion);
     steps_ = internal::measureStepSpeeds(model(), recorded_.time, recorded_.q, settings_.verdict);
     near_jumps_ = internal::findNearJumps(recorded_.time, steps_, settings_.verdict);
@@ -263,7 +265,7 @@ class MotionExaminer::Office::Case {
   }
 
  private:
-  const pinocchio::Model& model() const { return office_.robot.getModel(); }
+  const pinocchio::Model& model() const { return workspace_.robot.getModel(); }
 
   // Tells what part of all passes through the frames is done.
   std::function<void(Eigen::Index)> tellPass() {
@@ -280,8 +282,8 @@ class MotionExaminer::Office::Case {
     const auto frames = double(q.cols());
     std::vector<ContactMotion> nothing;
     MotionAnalysis dynamics;
-    office_.com_sweep.run({Eigen::VectorXd::LinSpaced(q.cols(), 1., frames), q, rest, rest},
-                          office_.workers, nothing, &dynamics);
+    workspace_.com_sweep.run({Eigen::VectorXd::LinSpaced(q.cols(), 1., frames), q, rest, rest},
+                             workspace_.workers, nothing, &dynamics);
     return std::move(dynamics.com);
   }
 
@@ -297,8 +299,8 @@ class MotionExaminer::Office::Case {
   SweptMotion sweep(const Motion& motion) {
     SweptMotion swept = {&motion, {}, {}, {}};
     std::vector<ContactMotion>& all = swept.contacts;
-    office_.sweep.run(motion, office_.workers, all, &swept.analysis, tellPass());
-    const auto parts = all.begin() + std::ptrdiff_t(office_.names.size());
+    workspace_.sweep.run(motion, workspace_.workers, all, &swept.analysis, tellPass());
+    const auto parts = all.begin() + std::ptrdiff_t(workspace_.names.size());
     swept.parts.assign(std::make_move_iterator(parts), std::make_move_iterator(all.end()));
     all.erase(parts, all.end());
     addLinks(swept);
@@ -308,7 +310,7 @@ class MotionExaminer::Office::Case {
   void addLinks(SweptMotion& swept) {
     if (!link_sweep_) return;
     std::vector<ContactMotion> links;
-    link_sweep_->run(*swept.motion, office_.workers, links, nullptr);
+    link_sweep_->run(*swept.motion, workspace_.workers, links, nullptr);
     std::move(links.begin(), links.end(), std::back_inserter(swept.parts));
   }
 
@@ -326,24 +328,25 @@ class MotionExaminer::Office::Case {
     const ContactSchedule* recorded = recorded_.schedule ? &*recorded_.schedule : nullptr;
     ContactInference found = inferFrom(*split_, derived, swept, recorded);
     const std::size_t count = split_->parts.size();
-    if (settings_.bodies.empty() || count >= kMaximalParts) return found;
+    if (settings_.bodies.empty() || count >= internal::ConeProjection::kMaximalPoints) return found;
     const auto lacks = [&](const ContactSplit& split, const ContactInference& inference) {
       return findMissing(split, swept, inference, findUnsure(derived, inference),
                          settings_.verdict);
     };
     const Mask missing = lacks(*split_, found);
     if (!isMuch(missing)) return found;
-    const std::vector<BodyPoints> bodies = internal::screenBodies(
-        model(), *office_.data.take(), settings_.bodies, *swept.motion, missing, findLevels(found),
-        settings_.detection.body_reach, kMaximalParts - count);
+    const std::vector<BodyPoints> bodies =
+        internal::screenBodies(model(), *workspace_.data.take(), settings_.bodies, *swept.motion,
+                               missing, findLevels(found), settings_.detection.body_reach,
+                               internal::ConeProjection::kMaximalPoints - count);
     if (bodies.empty()) return found;
 
-    links_.emplace(internal::splitCarrier(office_.robot, bodies));
+    links_.emplace(internal::splitCarrier(workspace_.robot, bodies));
     const auto& points = links_->carrier.contacts;
     link_sweep_.emplace(
         model(),
         std::vector<internal::FixedContact>(points.begin() + std::ptrdiff_t(count), points.end()),
-        settings_.analysis.lanes, office_.data);
+        settings_.analysis.lanes, workspace_.data);
     addLinks(swept);
     ContactInference other = inferFrom(*links_, derived, swept, recorded);
     const Eigen::Index given = missing.count() - lacks(*links_, other).count();
@@ -365,13 +368,13 @@ class MotionExaminer::Office::Case {
   void distribute(const ContactInference& inference, SweptMotion& swept) {
     const double given = settings_.detection.ground_height;
     const double ground_height =
-        findMeanGround(inference, std::isnan(given) ? office_.robot.getGroundHeight() : given);
+        findMeanGround(inference, std::isnan(given) ? workspace_.robot.getGroundHeight() : given);
     const auto run = [&](const internal::MotionDistribution& distribution) {
       distribution.run(inference.schedule, swept.parts, ground_height, settings_.analysis,
-                       office_.workers, swept.analysis, tellPass());
+                       workspace_.workers, swept.analysis, tellPass());
     };
-    if (split_ == &office_.split)
-      run(office_.distribution);
+    if (split_ == &workspace_.split)
+      run(workspace_.distribution);
     else
       run(internal::MotionDistribution(split_->carrier, settings_.analysis.lanes));
   }
@@ -383,7 +386,7 @@ class MotionExaminer::Office::Case {
         {split_->carrier, derived.motion.time, steps_, swept.parts, inference.ground,
          swept.analysis, swept.contacts, whole.active, near_jumps_, findUnsure(derived, inference),
          internal::isTooShort(derived.motion, recorded_)},
-        settings_.verdict, office_.workers);
+        settings_.verdict, workspace_.workers);
   }
 
   // Looks for seats where more is missing than who leans lacks.
@@ -395,16 +398,16 @@ class MotionExaminer::Office::Case {
     for (const MotionFault fault : {MotionFault::ResidualForce, MotionFault::ResidualTorque,
                                     MotionFault::FlightWithSupportNeeded})
       missing = missing || verdict[fault].measured.array() > kSeated;
-    if (levels.empty() || !isMuch(missing)) return {};
+    if (levels.empty() || !missing.any()) return {};
     return internal::findSeats(
         settings_.bodies, *swept.motion,
-        {model(), *office_.data.take(), *split_, swept.parts, inference.schedule, swept.analysis,
+        {model(), *workspace_.data.take(), *split_, swept.parts, inference.schedule, swept.analysis,
          missing, *std::max_element(levels.begin(), levels.end())},
         settings_);
   }
 
   ContactSchedule gather(const ContactSchedule& schedule) const {
-    return internal::gatherParts(office_.names, *split_, schedule);
+    return internal::gatherParts(workspace_.names, *split_, schedule);
   }
 
   // Writes what was found of parts as that of contacts.
@@ -416,13 +419,13 @@ class MotionExaminer::Office::Case {
     found.bodies = internal::gatherBodies(*split_, schedule);
     found.parts = split_->parts;
     found.ground = findGround(swept.contacts, found.parts, swept.parts, found.inference.ground);
-    found.analysis = internal::gatherParts(office_.robot, *split_, swept.contacts, swept.parts,
+    found.analysis = internal::gatherParts(workspace_.robot, *split_, swept.contacts, swept.parts,
                                            std::move(swept.analysis));
     dropIdle(found.bodies, found.analysis.bodies);
     found.contacts = std::move(swept.contacts);
     found.part_motions = std::move(swept.parts);
     found.statistics =
-        summarizeMotion(office_.robot, found.derived.motion, found.analysis, found.verdict);
+        summarizeMotion(workspace_.robot, found.derived.motion, found.analysis, found.verdict);
   }
 
   CutoffSensitivity tryCutoff(double cutoff, const MotionExamination& found) {
@@ -432,53 +435,54 @@ class MotionExaminer::Office::Case {
     distribute(found.inference, swept);
     MotionVerdict verdict = judge(derived, found.inference, swept);
     MotionStatistics statistics =
-        summarizeMotion(office_.robot, derived.motion,
-                        internal::gatherParts(office_.robot, *split_, swept.contacts, swept.parts,
-                                              std::move(swept.analysis)),
+        summarizeMotion(workspace_.robot, derived.motion,
+                        internal::gatherParts(workspace_.robot, *split_, swept.contacts,
+                                              swept.parts, std::move(swept.analysis)),
                         verdict);
     return {cutoff, std::move(verdict), std::move(statistics)};
   }
 
-  Office& office_;
+  Workspace& workspace_;
   const RecordedMotion& recorded_;
   const ExaminationSettings& settings_;
   const std::function<void(double)>& progress_;
   const internal::Derivation derivation_ = {
-      model(), office_.data, [this](const Eigen::MatrixXd& q) { return findCoM(q); }};
+      model(), workspace_.data, [this](const Eigen::MatrixXd& q) { return findCoM(q); }};
   double passes_ = 1., done_ = 0.;
   internal::StepSpeeds steps_;
   Mask near_jumps_;
-  const ContactSplit* split_ = &office_.split;  // what carries: the contacts, or
-  std::optional<ContactSplit> links_;           // those with links besides
+  const ContactSplit* split_ = &workspace_.split;  // what carries: the contacts, or
+  std::optional<ContactSplit> links_;              // those with links besides
   std::optional<internal::MotionSweep> link_sweep_;
 };
 
-MotionExamination MotionExaminer::Office::examine(const RecordedMotion& recorded,
-                                                  const std::function<void(double)>& progress) {
-  return Case(*this, recorded, progress).examine();
+MotionExamination MotionExaminer::Workspace::examine(const RecordedMotion& recorded,
+                                                     const std::function<void(double)>& progress) {
+  return Pipeline(*this, recorded, progress).examine();
 }
 
 MotionExaminer::MotionExaminer(const DynaCoM& robot, const ExaminationSettings& settings) {
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by MotionExaminer before initialize()");
   settings.validate();
-  office_ = std::make_unique<Office>(robot, settings);
+  workspace_ = std::make_unique<Workspace>(robot, settings);
 }
 
 MotionExaminer::MotionExaminer(const MotionExaminer& other)
-    : office_(std::make_unique<Office>(other.office_->robot, other.office_->settings)) {}
+    : workspace_(std::make_unique<Workspace>(other.workspace_->robot, other.workspace_->settings)) {
+}
 
 MotionExaminer::~MotionExaminer() = default;
 MotionExaminer::MotionExaminer(MotionExaminer&&) noexcept = default;
 MotionExaminer& MotionExaminer::operator=(MotionExaminer other) noexcept {
-  office_.swap(other.office_);
+  workspace_.swap(other.workspace_);
   return *this;
 }
 
-const ExaminationSettings& MotionExaminer::getSettings() const { return office_->settings; }
+const ExaminationSettings& MotionExaminer::getSettings() const { return workspace_->settings; }
 
 MotionExamination MotionExaminer::examine(const RecordedMotion& recorded) const {
-  return office_->examine(recorded, office_->settings.progress);
+  return workspace_->examine(recorded, workspace_->settings.progress);
 }
 
 MotionExamination examineMotion(const DynaCoM& robot, const RecordedMotion& recorded,
@@ -497,7 +501,7 @@ void MotionExaminer::examineMany(
     std::optional<MotionExamination> found;
     std::string error;
     try {
-      found = office_->examine(read(clip), nullptr);
+      found = workspace_->examine(read(clip), nullptr);
     } catch (const std::exception& exception) {
       error = exception.what();
     } catch (...) {
@@ -509,8 +513,8 @@ void MotionExaminer::examineMany(
     done(clip, found ? &*found : nullptr, error);
     ends = false;
   };
-  office_->workers.forEach(static_cast<Eigen::Index>(clips),
-                           [&]() -> internal::Workers::Work { return examineClip; });
+  workspace_->workers.forEach(static_cast<Eigen::Index>(clips),
+                              [&]() -> internal::Workers::Work { return examineClip; });
 }
 
 void analyzeMotions(

@@ -7,15 +7,13 @@
 #include "check.hpp"
 #include "motion_check.hpp"
 #include "nan.hpp"
+#include "standard_gravity.hpp"
 
 namespace dynacom {
 
 using internal::kNaN;
 
 namespace {
-
-// What forces are compared with where there is no gravity [m/s²].
-constexpr double kStandardGravity = 9.81;
 
 // Of the numbers that are not NaN; NaN if there are none.
 double largestOf(const Eigen::VectorXd& numbers) {
@@ -118,7 +116,7 @@ MotionStatistics summarizeMotion(const DynaCoM& robot, const Motion& motion,
   MotionStatistics statistics = {};
   statistics.frames = frames;
   statistics.mass = robot.getMass();
-  statistics.weight = statistics.mass * (gravity > 0. ? gravity : kStandardGravity);
+  statistics.weight = statistics.mass * (gravity > 0. ? gravity : internal::kStandardGravity);
   for (const DistributionStatus status : analysis.status) ++statistics.statuses[status];
   statistics.mean_vertical_force = analysis.ground_force.row(2).mean() / statistics.weight;
   if (frames > 1)

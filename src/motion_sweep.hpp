@@ -27,10 +27,8 @@ class MotionSweep {
   int lanes() const { return lane_robot_ ? lane_robot_->lanes() : 1; }
 
   /// @param contacts  becomes computeContactMotions() of these contacts
-  /// @param dynamics  is given its time, and what MotionAnalysis says from com to ground_torque,
-  /// but
-  ///                  nothing of what contacts do; null if nobody wants that, and then the motion
-  ///                  must be valid
+  /// @param dynamics  is given its time, and from com to ground_torque what MotionAnalysis says,
+  ///                  nothing of contacts; null if nobody wants that: then the motion must be valid
   /// @param progress  as that of forEachBlock()
   /// @throws std::invalid_argument if the motion is not valid
   void run(const Motion& motion, Workers& workers, std::vector<ContactMotion>& contacts,

@@ -11,6 +11,7 @@
 #include "motion_judgement.hpp"
 #include "motion_windows.hpp"
 #include "nan.hpp"
+#include "standard_gravity.hpp"
 #include "support_meter.hpp"
 
 namespace dynacom {
@@ -25,8 +26,6 @@ namespace {
 using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 using Vector6 = DynaCoM::Vector6;
 
-// What forces and moments are compared with, whatever gravity is [m/s²] and [m].
-constexpr double kStandardGravity = 9.81;
 constexpr double kLever = 1.;
 // How many frames at either side of a jump are unsure at least: differences reach that far.
 constexpr Eigen::Index kJumpFrames = 2;
@@ -329,7 +328,7 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
   MotionVerdict verdict = {};
   verdict.unsure = judged.unsure;
 
-  const double weight = judged.carrier.mass * kStandardGravity;
+  const double weight = judged.carrier.mass * internal::kStandardGravity;
   std::array<Eigen::VectorXd, kMotionFaults> measured;
   for (Eigen::VectorXd& values : measured) values.setZero(frames);
   const auto measure = [&](MotionFault fault) -> Eigen::VectorXd& {

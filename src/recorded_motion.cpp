@@ -10,6 +10,7 @@
 #include "motion_check.hpp"
 #include "motion_derivation.hpp"
 #include "nan.hpp"
+#include "standard_gravity.hpp"
 
 namespace dynacom {
 
@@ -57,7 +58,6 @@ double chooseCutoff(const internal::Derivation& derivation, const Eigen::VectorX
 void markUnsure(const pinocchio::Model& model, pinocchio::Data& data, bool is_first,
                 DerivedMotion& derived) {
   constexpr Eigen::Index kSamples = 4;
-  constexpr double kStandardGravity = 9.81;
   const Motion& motion = derived.motion;
   const Eigen::Index last = motion.frames() - 1;
   const auto periods = [&](double count) {
@@ -69,8 +69,8 @@ void markUnsure(const pinocchio::Model& model, pinocchio::Data& data, bool is_fi
     const Eigen::Index frame = is_first ? away : last - away;
     const CentroidalState state = computeCentroidalState(model, data, motion.q.col(frame),
                                                          motion.v.col(frame), motion.a.col(frame));
-    const double weight = state.mass * kStandardGravity;
-    force += (state.acom / kStandardGravity).squaredNorm() / double(kSamples);
+    const double weight = state.mass * internal::kStandardGravity;
+    force += (state.acom / internal::kStandardGravity).squaredNorm() / double(kSamples);
     torque += (state.amVariation / weight).squaredNorm() / double(kSamples);
   }
   if (std::sqrt(force) <= kUnsureForce && std::sqrt(torque) <= kUnsureTorque) return;

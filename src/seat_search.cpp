@@ -27,7 +27,6 @@ constexpr double kAboveGround = 0.2;
 constexpr double kThickness = 0.05;
 // Less than this is no reason to ask for a seat [m g].
 constexpr double kLeastShare = 0.3;
-constexpr std::size_t kMaximalPoints = 32;
 
 struct Run {
   Index first, behind;
@@ -136,7 +135,7 @@ std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion&
         }
         std::uint32_t seat = 0;
         for (const Index point : low) {
-          if (levers.size() == kMaximalPoints) break;
+          if (levers.size() == ConeProjection::kMaximalPoints) break;
           seat |= std::uint32_t(1) << levers.size();
           levers.push_back(places[sample].col(point) - com);
           mu.push_back(body_mu);

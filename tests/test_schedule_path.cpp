@@ -21,9 +21,8 @@ using Mask = std::uint32_t;
 
 /// Points that move at random about their rests, and a wrench that now one, now another could give.
 struct Problem {
-  /// @param is_calm  whether points stay where they are for some frames, so that the cheapest set
-  /// of
-  ///                 a frame is that of the next, too
+  /// @param is_calm  whether points stay where they are for some frames, so that what is cheapest
+  ///                 in a frame is so in the next, too
   Problem(Random& random, const std::vector<int>& given_limbs, Index given_frames,
           bool is_calm = false)
       : limbs(given_limbs), frames(given_frames) {

@@ -19,6 +19,7 @@ struct DYNACOM_EXPORT AnalysisSettings {
   /// √(g / mean height of the CoM above the ground).
   double omega = 0.;
   /// Called now and then, in the caller's thread, with the number of frames done, which increases.
+  /// Dynamics come first, of all frames, without a call.
   std::function<void(Eigen::Index)> progress;
   /// How many threads do the work, at most; 0 stands for as many as the machine has. Blocks of 256
   /// frames, each of which starts cold, are what a thread takes: results are the same, bit for bit,

@@ -111,8 +111,8 @@ class DYNACOM_EXPORT MotionExaminer {
                                             const std::string&)>& done) const;
 
  private:
-  struct Office;
-  std::unique_ptr<Office> office_;
+  struct Workspace;
+  std::unique_ptr<Workspace> workspace_;
 };
 
 /// Judges one recorded motion, see MotionExaminer::examine().

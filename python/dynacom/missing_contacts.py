@@ -63,10 +63,11 @@ def _intervals(beyond: np.ndarray, time: np.ndarray, least: float) -> list[tuple
     ends = np.append(time[1:], 2.0 * time[-1] - time[-2] if len(time) > 1 else time[-1])
     intervals: list[tuple[int, int]] = []
     for frame in np.flatnonzero(beyond).tolist():
-        if intervals and time[frame] - ends[intervals[-1][1]] < least - _ROUNDING:
-            intervals[-1] = intervals[-1][0], frame
-        else:
+        first, last = intervals[-1] if intervals else (frame, frame)
+        if last < frame - 1 and time[frame] - ends[last] >= least - _ROUNDING:
             intervals.append((frame, frame))
+        else:
+            intervals[-1:] = [(first, frame)]
     return [
         (first, last) for first, last in intervals if ends[last] - time[first] >= least - _ROUNDING
     ]

@@ -39,6 +39,8 @@ class Clip:
     quaternion_error: np.ndarray = field(repr=False)
     #: What was assumed, mapped, held, normalised: sentences.
     notes: tuple[str, ...]
+    #: Where the file has dropped frames, which are made anew here; None where it has not.
+    gaps: Gaps | None = None
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ def clip_from_configurations(
         v, a = (None if values is None else gaps.interpolated(values) for values in (v, a))
         schedule = None if schedule is None else gaps.schedule(schedule)
         forces = gaps.forces(forces)
-    return Clip(path, time, q, v, a, given, schedule, forces, error, tuple(notes))
+    return Clip(path, time, q, v, a, given, schedule, forces, error, tuple(notes), gaps)
 
 
 def schedule_from_masks(names: Sequence[str], masks: np.ndarray) -> ContactSchedule:

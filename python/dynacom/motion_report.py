@@ -3,7 +3,6 @@
 
 import copy
 import json
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -362,6 +361,9 @@ def _find_schedule(
 ) -> tuple[ContactSchedule | None, str]:
     """When contacts are active, if anybody says so, and who does."""
     if isinstance(given, ContactSchedule):
+        # Of the file's frames, or of all.
+        if clip.gaps and len(np.asarray(given.active)) == len(clip.gaps.time):
+            given = clip.gaps.schedule(given)
         return given, "Contacts are active as the caller says."
     if given is not None:
         schedule = read_schedule(given, clip.time, list(robot.contacts))
@@ -378,7 +380,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
     clip, robot, found = report.clip, report.robot, report.examination
     derived, statistics = found.derived, found.statistics
     derivatives = _derivatives_text(clip, derived)
-    downward = list(_downward_texts(robot, found.verdict, report.options))
+    downward = list(_downward_texts(robot, found.verdict))
     missing = find_missing(found, report.options)
     notes = [
         *downward,
@@ -487,20 +489,17 @@ def _cutoff_text(derived: DerivedMotion) -> str:
     return text
 
 
-def _downward_texts(
-    robot: Robot, verdict: MotionVerdict, options: AnalysisOptions
-) -> Iterator[str]:
-    """Of the contacts for which the fault ``downward_normal`` speaks."""
-    if not verdict.findings["downward_normal"].holds:
-        return
-    limit = math.sin(min(options.verdict.downward_normal.limit, 0.5 * math.pi))
+def _downward_texts(robot: Robot, verdict: MotionVerdict) -> Iterator[str]:
+    """Of contacts whose normal points down for most of the time, or beyond the fault's limit."""
+    finding = verdict.findings["downward_normal"]
     for (name, settings), normal in zip(robot.contacts.items(), verdict.normals, strict=True):
-        if normal.up < -limit:
+        if normal.downward_share > 0.5 or (finding.holds and finding.subject == name):
             yield (
                 f"{name}'s normal points down (the z axis of the frame {settings.frame_name} has "
-                f"a vertical component of {normal.up:.2f} on average) while it carries: a "
-                "contact's z axis must point into the robot, else its force would pull. The robot "
-                "file is to be corrected first."
+                f"a vertical component of {normal.up:.2f} on average) in "
+                f"{normal.downward_share:.0%} of the frames in which it carries: a contact's z "
+                "axis must point into the robot, else its force would pull. The robot file is to "
+                "be corrected first."
             )
 
 

@@ -19,6 +19,8 @@ class ConeProjection {
  public:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
 
+  static constexpr std::size_t kMaximalPoints = 32;  // a set has so many bits
+
   /// What of a wrench cannot be given.
   struct Residual {
     double force, torque;  // norms, of the parts of a wrench as it was given
@@ -30,7 +32,7 @@ class ConeProjection {
   /// @param wrench    (force, moment) about some point
   /// @param levers    from that point to the points that may push
   /// @param mu        of each
-  /// @param set       a bit for each point that pushes, of which there are at most 32
+  /// @param set       a bit for each point that pushes, of which there are at most kMaximalPoints
   /// The edges that made up the last answer are tried first: consecutive frames have much in
   /// common.
   Residual project(const Vector6& wrench, const Eigen::Matrix3Xd& levers,

@@ -7,6 +7,8 @@
 
 #include "../check.hpp"
 #include "../nan.hpp"
+#include "../standard_gravity.hpp"
+#include "cone_projection.hpp"
 #include "contact_inference.hpp"
 #include "dynacom/contact_point.hpp"
 #include "ground_slope.hpp"
@@ -18,10 +20,6 @@ using Eigen::Index;
 using internal::kNaN;
 
 namespace {
-
-constexpr std::size_t kMaximalParts = 32;
-// What forces are parts of where there is no gravity [m/s²].
-constexpr double kStandardGravity = 9.81;
 
 // How readily parts bear load: less where their contact has just begun, or is about to end.
 Eigen::MatrixXd findReadiness(const ContactSchedule::Matrix& active, const Eigen::VectorXd& time,
@@ -126,8 +124,9 @@ ContactInference internal::inferContacts(const ContactSplit& parts,
   const std::size_t count = parts.parts.size();
   internal::requireSize("motions", motions.size(), count, "parts");
   internal::requireSize("parts.robot", parts.carrier.contacts.size(), count, "contacts");
-  if (count > kMaximalParts)
-    internal::throwInvalid("contacts must have at most ", kMaximalParts, " parts, got ", count);
+  constexpr std::size_t most = ConeProjection::kMaximalPoints;
+  if (count > most)
+    internal::throwInvalid("contacts must have at most ", most, " parts, got ", count);
   for (const auto* values : {&dynamics.com, &dynamics.ground_force, &dynamics.ground_torque})
     internal::requireSize("dynamics", values->cols(), frames, "frames");
 
@@ -162,7 +161,7 @@ ContactInference internal::inferContacts(const ContactSplit& parts,
   const internal::CostScales scales = internal::findScales(tracks, rests, time, settings);
   const internal::WrenchTrack wrench{dynamics.com, dynamics.ground_force, dynamics.ground_torque};
   const double gravity = -parts.carrier.gravity.z();
-  const double weight = parts.carrier.mass * (gravity > 0. ? gravity : kStandardGravity);
+  const double weight = parts.carrier.mass * (gravity > 0. ? gravity : internal::kStandardGravity);
   internal::KnownContacts known;
   if (recorded) known = findKnown(parts, *recorded, frames);
   const internal::SchedulePath path = internal::findSchedulePath(

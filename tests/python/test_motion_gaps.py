@@ -58,7 +58,6 @@ def test_whatever_the_file_has_is_made_too(tmp_path, toy):
     # Cubics are what they were.
     np.testing.assert_allclose(clip.v, v, atol=1e-9)
     np.testing.assert_allclose(clip.a, v, atol=1e-9)
-    np.testing.assert_allclose(clip.forces["pad"][kept], clip.forces["pad"][kept])
     np.testing.assert_allclose(clip.forces["pad"], wrenches[:, 1], atol=1e-9)
     # Contacts are those of the frame before.
     expected = masks.copy()

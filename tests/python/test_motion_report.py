@@ -468,6 +468,13 @@ def test_intervals_of_what_is_missing(beyond, expected):
     assert missing_contacts._intervals(marks, 0.1 * np.arange(len(marks)), 0.3) == expected
 
 
+def test_intervals_without_a_least_duration():
+    """Frames that follow each other are one interval all the same."""
+    marks = np.array([True, True, False, True, False, False, True, True])
+    found = missing_contacts._intervals(marks, 0.1 * np.arange(len(marks)), 0.0)
+    assert found == [(0, 1), (3, 3), (6, 7)]
+
+
 def test_nothing_is_missing_of_what_is_unknown(talos, walk):
     schedule = ContactSchedule(["left_sole"], np.zeros((318, 1), dtype=bool))
     report = analyze(walk, talos, schedule=schedule)
