@@ -77,7 +77,7 @@ struct DYNACOM_EXPORT DetectionSettings {
   /// the air never pays for it by this cost alone.
   double fine_excess = 4.;
   /// The same in absolute scales, [m] and [m/s], with a factor, and the greatest cost.
-  double coarse_factor = 3., coarse_height = 0.05, coarse_speed = 0.45, coarse_greatest = 50.;
+  double coarse_factor = 3., coarse_height = 0.05, coarse_speed = 0.4, coarse_greatest = 50.;
   /// How far below its rest a point is pressed, and not sunk [m].
   double pressed_depth = 0.07;
   /// Of what contacts cannot give, in its own scales, the greatest cost; and of [m g] and [m g m],
