@@ -152,7 +152,10 @@ void exposeMotionExamination() {
            "cutoff: of the filter where derivatives have to be computed, 0 for none [Hz];\n"
            "sensitivity: whether to judge motions with half and twice the cut-off, too; progress:\n"
            "called now and then with what part of the frames is analysed; bodies: BodyPoints of\n"
-           "links that may touch the ground where contacts do not suffice; the others as in the\n"
+           "links that may touch the ground where contacts do not suffice, of "
+           "findCollisionPoints():\n"
+           "dynacom.analyze gives them, and without them nobody kneels or lies; the others as in "
+           "the\n"
            "functions named above. Raises ValueError if one is out of its range, NotReadyError\n"
            "before the robot's initialize().")
       .def("examine", &examine, (bp::arg("self"), bp::arg("recorded")),

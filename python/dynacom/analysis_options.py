@@ -38,18 +38,23 @@ AUTO = "auto"
 
 @dataclass(slots=True)
 class AnalysisOptions:
-    """How a motion is analysed."""
+    """How a motion is analysed.
 
-    #: Of the filter where velocities and accelerations are computed [Hz]; 0 or None for no filter,
-    #: "auto" for what suits the motion, see ``deriveMotion``.
+    Attributes:
+        cutoff: of the filter where velocities and accelerations are computed [Hz]; 0 or None for no
+            filter, "auto" for what suits the motion, see ``deriveMotion``.
+        omega: of virtual repellent point and divergent component of motion [rad/s]; 0 stands for
+            sqrt(g / mean height of the CoM above the ground).
+        flat: whether the centre of pressure is that of flat horizontal ground.
+        feet_only: whether nothing but the robot's contacts may touch the ground; else its links
+            may, too, where contacts do not suffice.
+        detection: how contacts are found, see ``inferContacts``.
+        verdict: limits of the verdict, see ``judgeMotion``.
+    """
+
     cutoff: float | Literal["auto"] | None = AUTO
-    #: Of virtual repellent point and divergent component of motion [rad/s]; 0 stands for
-    #: sqrt(g / mean height of the CoM above the ground).
     omega: float = 0.0
-    #: Whether the centre of pressure is that of flat horizontal ground.
     flat: bool = True
-    #: Whether nothing but the robot's contacts may touch the ground; else its links may, too, where
-    #: contacts do not suffice.
     feet_only: bool = False
     detection: DetectionSettings = field(default_factory=DetectionSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)

@@ -11,12 +11,17 @@ from dynacom.dynacom_pywrap import DistributionStatus, MotionExamination, Motion
 
 # What is measured of forces: where one is beyond its limit, something is missing.
 _FAULTS = ("residual_force", "residual_torque", "cop_outside", "flight_with_support_needed")
+# What forces are compared with in verdicts, whatever gravity is [m/s^2].
+_STANDARD_GRAVITY = 9.81
 # So many intervals are told one by one.
 _LISTED = 3
 # From which mean residual on it may be a load that nobody has told of, [m g] or [m g m], and as a
 # part of the residual's root mean square, since a load does not change its sign: a box that a G1
 # carries for half of a clip comes to 0.005 and a quarter, dances without a load to a twentieth.
 _LOAD, _LOAD_PART = 0.003, 0.2
+# Nothing pulls along the ground by more than this all the time, and no load that is carried weighs
+# more than this, or presses with more than this, [m g] and [m g m].
+_PULL, _LARGEST = 0.02, 0.3
 # Durations may lack this through the rounding of times [s].
 _ROUNDING = 1e-9
 
@@ -46,7 +51,8 @@ def find_missing(found: MotionExamination, options: AnalysisOptions) -> dict[str
         missing[first : last + 1] = True
     residual = found.analysis.residual[missing & ~np.asarray(verdict.unsure)]
     largest = np.linalg.norm(residual.reshape(-1, 2, 3), axis=2).max(axis=0)
-    force, torque = (largest / found.statistics.weight).tolist()
+    # As the faults have it, whatever gravity is.
+    force, torque = (largest / (found.statistics.mass * _STANDARD_GRAVITY)).tolist()
     return {
         "frames": int(np.count_nonzero(missing)),
         "share": float(np.mean(missing)),
@@ -142,16 +148,18 @@ def _advice(found: MotionExamination, options: AnalysisOptions) -> str:
         text = "there is a seat, which a contact of the robot file on that link and --schedule tell"
     else:
         text = (
-            "a contact is missing, which --schedule tells if a foot stands on a box, and with a "
-            "contact of the robot file if another link rests on something"
+            "something carries that is not known: a foot on a box is told by --schedule, another "
+            "link on something by a contact of the robot file besides"
         )
     if options.feet_only:
-        text += ", or --feet-only leaves out knees or hands"
-    return f"Either {text}; or the motion is too fast, or leans too far."
+        text += "; or knees or hands carry, which --feet-only leaves out"
+    return f"Either {text}; or the robot leans too far, or accelerates too much."
 
 
 def _is_load(statistics: MotionStatistics) -> bool:
     """Whether what is missing may be a load: enough of it, and much the same all the time."""
     means = np.linalg.norm(statistics.mean_residual.reshape(2, 3), axis=1) / statistics.weight
     spread = np.array([statistics.residual_force_rms, statistics.residual_torque_rms])
-    return bool((means > np.maximum(_LOAD, _LOAD_PART * spread)).any())
+    pull = np.linalg.norm(statistics.mean_residual[:2]) / statistics.weight
+    may_be = pull < _PULL and (means < _LARGEST).all()
+    return bool(may_be and (means > np.maximum(_LOAD, _LOAD_PART * spread)).any())

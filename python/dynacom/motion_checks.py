@@ -166,7 +166,8 @@ def normalize(
                     return quaternion, error, [f"The root's quaternions, {_ORDERS[order]}, {turn}."]
                 raise DynacomError(
                     f"{path}: the root's quaternions must be {_ORDERS[order]}, got "
-                    f"{_ORDERS[other]}: they {turn}" + (f"; give --quat {other}" if option else "")
+                    f"{_ORDERS[other]}: they {turn}"
+                    + (f"; give --quat {other}, or --quat {order} if it does lie" if option else "")
                 )
     return quaternion, error, []
 

@@ -11,7 +11,7 @@ from dynacom.motion_csv import read_csv
 from dynacom.motion_npz import read_npz
 from dynacom.motion_parquet import read_parquet
 from dynacom.motion_pickle import read_pickle
-from dynacom.robots import Robot
+from dynacom.robots import Robot, load_robot
 
 __all__ = ["Clip", "read_motion"]
 
@@ -31,7 +31,7 @@ SUFFIXES = tuple(_READERS)
 
 def read_motion(
     path: str | Path,
-    robot: Robot,
+    robot: Robot | str | Path,
     *,
     fps: float | None = None,
     quat: str | None = None,
@@ -44,6 +44,8 @@ def read_motion(
     .pkl (.pickle, .joblib).
 
     Args:
+        path: the file.
+        robot: whose motion it is: a robot, or what :func:`load_robot` takes, a name or a file.
         fps: frame rate [Hz], for files that have neither times nor a frame rate. It counts more
             than a file's frame rate, and less than its times.
         quat: order of the root's quaternion where the file does not name its components: ``xyzw``
@@ -54,10 +56,12 @@ def read_motion(
     Raises:
         DynacomError: the file cannot be read, is in none of the formats, or is no motion of this
             robot: other joints, quaternions of another order, degrees, numbers that are not finite,
-            times that do not increase or have a hole, a jump. The message is one line that says
+            times that do not increase or have a hole. The message is one line that says
             what and where.
     """
     path = Path(path)
+    if not isinstance(robot, Robot):
+        robot = load_robot(robot)
     if quat not in (None, "xyzw", "wxyz"):
         raise DynacomError(f"quat must be xyzw or wxyz, got '{quat}'")
     suffix = path.suffix.lower()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynacom.analysis_options import AnalysisOptions
+from dynacom.analysis_options import AUTO, AnalysisOptions
 from dynacom.dynacom_pywrap import (
     ContactSchedule,
     CutoffSensitivity,
@@ -379,17 +379,19 @@ def _find_schedule(
 def _summarize(report: MotionReport) -> dict[str, Any]:
     clip, robot, found = report.clip, report.robot, report.examination
     derived, statistics = found.derived, found.statistics
-    derivatives = _derivatives_text(clip, derived)
+    derivatives = _derivatives_text(clip, derived, report.options)
     downward = list(_downward_texts(robot, found.verdict))
     missing = find_missing(found, report.options)
     notes = [
         *downward,
+        *_gravity_texts(robot),
         *clip.notes,
         derivatives,
         report._schedule_text,
-        *terrain_texts(robot, found),
+        *terrain_texts(robot, report.options, found),
         *body_texts(robot, report.options, found),
         *missing_texts(missing, found, report.options, is_reversed=bool(downward)),
+        *_unjudged_texts(found),
     ]
     sensitivity = []
     if derived.cutoff > 0.0:
@@ -433,15 +435,16 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
     }
 
 
-def _derivatives_text(clip: Clip, derived: DerivedMotion) -> str:
+def _derivatives_text(clip: Clip, derived: DerivedMotion, options: AnalysisOptions) -> str:
     """Where velocities and accelerations come from."""
     mismatch = derived.mismatch
     differ = f"differ by {mismatch.velocity:.1%} and {mismatch.acceleration:.1%} from"
     if derived.is_recorded:
-        return (
+        text = (
             f"Velocities and accelerations are the file's: they {differ} its positions and "
             "velocities."
         )
+        return text if options.cutoff in (AUTO, None) else f"{text} No cut-off is used."
     if clip.v is None:
         reason = "the file has none"
     elif clip.a is None:
@@ -487,6 +490,24 @@ def _cutoff_text(derived: DerivedMotion) -> str:
             f"{derived.frame_rate:.3g} frames a second."
         )
     return text
+
+
+def _gravity_texts(robot: Robot) -> Iterator[str]:
+    """Where it is not the Earth's."""
+    gravity = -robot.model.gravity.linear[2]
+    if abs(gravity - 9.81) > 0.01:
+        yield f"Gravity is {gravity:g} m/s^2; m g is with 9.81 m/s^2 all the same."
+
+
+def _unjudged_texts(found: MotionExamination) -> Iterator[str]:
+    """Frames whose forces nobody judges, beside those that the derivatives' sentence tells of."""
+    unsure = np.count_nonzero(found.verdict.unsure)
+    if unsure > np.count_nonzero(found.derived.unsure):
+        yield (
+            f"Forces are not judged in {unsure} of {len(found.verdict.unsure)} frames, in which "
+            "accelerations are not known: where the clip begins or ends in motion, beside jumps, "
+            "and within half a period of the filter from take-offs and landings."
+        )
 
 
 def _downward_texts(robot: Robot, verdict: MotionVerdict) -> Iterator[str]:

@@ -77,7 +77,10 @@ def _windows_text(summary: dict[str, Any], listed: int = 8) -> str:
     windows = summary["windows"]
     shortest = summary["options"]["verdict"]["minimal_window"]
     if not windows:
-        return f"no window of {shortest:g} s or more"
+        is_short = summary["duration"] < shortest
+        return f"no window of {shortest:g} s or more" + (
+            ": the clip is shorter" if is_short else ""
+        )
     texts = [f"{begin:.2f} to {end:.2f} s" for begin, end in windows[:listed]]
     more = f", and {len(windows) - listed} more" if len(windows) > listed else ""
     return f"{summary['feasible_share']:.1%} of the frames: {', '.join(texts)}{more}"

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from dynacom.analysis_options import AnalysisOptions
 from dynacom.dynacom_pywrap import MotionExamination, Stance
 from dynacom.robots import Robot
 
@@ -41,27 +42,36 @@ def _median(values: np.ndarray) -> float | None:
     return float(0.5 * (ordered[(len(values) - 1) // 2] + ordered[middle]))
 
 
-def terrain_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
+def terrain_texts(
+    robot: Robot, options: AnalysisOptions, found: MotionExamination
+) -> Iterator[str]:
     """Sentences on the ground: where it is, how it moves, and what was not taken for it."""
     heights = ground_heights(robot, found)
     known = {name: height for name, height in heights.items() if height is not None}
     velocity = found.inference.ground_velocity
+    is_told = np.isfinite(options.detection.ground_velocity).all()
     if velocity.any():
         yield (
             f"The ground moves by ({_text(velocity[0], 2)}, {_text(velocity[1], 2)}) m/s: a "
-            "treadmill. Speeds "
-            "of contacts are relative to it; --ground-velocity says another."
+            f"treadmill{', as --ground-velocity says' if is_told else ''}. Speeds of contacts are "
+            f"relative to it{'' if is_told else '; --ground-velocity says another'}."
         )
     if not heights:
         yield "The robot has no contacts."
-    elif not known:
+    elif not np.asarray(found.schedule.active).any():
         yield f"No contact {'of the robot file ' if found.analysis.bodies else ''}is ever active."
+    elif not known:
+        yield (
+            "Contacts are active, but nowhere at rest"
+            + (" on a ground that moves so" if velocity.any() else "")
+            + ": where the ground is, is not known."
+        )
     elif slope := _slope_text(found):
         yield slope
     else:
         yield from _level_texts(robot, found, known)
     if not found.analysis.bodies:  # who lies or kneels has the feet where they are
-        yield from _held_texts(robot, found)
+        yield from _held_texts(robot, options, found)
     yield from _disagreement_texts(found)
 
 
@@ -101,8 +111,8 @@ def _slope_text(found: MotionExamination) -> str | None:
     angle = np.degrees(np.arctan(np.linalg.norm(gradient)))
     towards = np.degrees(np.arctan2(gradient[1], gradient[0]))
     return (
-        f"The ground is a slope of {angle:.1f} degrees, which rises towards {towards:.0f} degrees "
-        "from the world's x axis."
+        f"The ground is a slope of {angle:.1f} degrees, which rises towards {_text(towards, 0)} "
+        "degrees from the world's x axis."
     )
 
 
@@ -119,15 +129,16 @@ def _level_texts(robot: Robot, found: MotionExamination, known: dict[str, float]
             *first, last = (_text(height, 2) for height in sorted(own))
             steps.append(f"{name} stands at {', '.join(first)} and {last} m")
     if steps:
-        yield f"{'; '.join(steps)}: steps or stairs."
+        yield f"{'; '.join(steps)}: steps or stairs, or feet that float."
     else:
         text = ", ".join(f"{name} {_text(height, 3)} m" for name, height in known.items())
         yield f"Height of the ground: {text}."
-    if min(abs(height) for height in known.values()) > _FAR_FROM_ZERO:
+    lowest = min((stance.height for stance in _used(found)), default=min(known.values()))
+    if abs(lowest) > _FAR_FROM_ZERO:
         yield "The ground is not near the height 0: is it this robot's motion?"
 
 
-def _held_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
+def _held_texts(robot: Robot, options: AnalysisOptions, found: MotionExamination) -> Iterator[str]:
     """Feet, and corners of feet, that are at rest where nothing was seen to carry them."""
     time, active = found.analysis.time, np.asarray(found.schedule.active)
     lowest: dict[tuple[str, bool], tuple[float, Stance]] = {}
@@ -146,13 +157,20 @@ def _held_texts(robot: Robot, found: MotionExamination) -> Iterator[str]:
         key = name, is_tilted
         if key not in lowest or stance.height < lowest[key][0]:
             lowest[key] = stance.height, stance
-    ground = np.median(on_ground) if on_ground else 0.0
+    ground, is_given = options.detection.ground_height, True
+    if np.isnan(ground):
+        ground, is_given = np.median(on_ground) if on_ground else 0.0, False
     for (name, is_tilted), (height, stance) in lowest.items():
         where = f"{100.0 * (height - ground):.0f} cm up at {time[stance.first]:.2f} s"
         if is_tilted:
             yield (
                 f"{name} is tilted: its {' and '.join(sorted(tilted[name]))} rest {where}, and "
                 "carry nothing."
+            )
+        elif is_given:
+            yield (
+                f"{name} rests {where}, above the ground that --ground-height tells of, and so "
+                "carries nothing."
             )
         else:
             yield (

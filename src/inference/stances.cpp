@@ -245,7 +245,7 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
     for (Rests& rests : all)
       for (Rest& rest : rests.list) {
         rest.on_ground = rest.height <= settings.ground_height + settings.same_ground;
-        rest.height = settings.ground_height;
+        if (rest.on_ground) rest.height = settings.ground_height;
       }
     return all;
   }

@@ -419,7 +419,8 @@ def test_what_is_printed(analyze, motion_file, talos):
     reasons = [entry for entry in found["reasons"] if entry["holds"]]
     assert len(reasons) >= 2
     assert rows[1 : 1 + len(reasons)] == [(entry["code"], entry["text"]) for entry in reasons]
-    assert rows[1 + len(reasons)] == ("Without fault", "no window of 1 s or more")
+    text = "no window of 1 s or more: the clip is shorter"
+    assert rows[1 + len(reasons)] == ("Without fault", text)
     table = dict(rows)
     assert table["Motion"] == "0.780 s, 40 frames at 50 Hz"
     for status, count in found["statuses"].items():

@@ -380,20 +380,24 @@ def test_unexplained_loads_go_with_the_robot(talos, walk):
     assert np.abs(turned["residual"].mean(axis=0) - mean).max() > 10.0
     for part in ("force", "torque"):
         assert_allclose(turned.summary["unexplained"][part], lost[part], rtol=0, atol=1e-6)
-    note = report.summary["notes"][-1]
-    assert "a load that nobody has told of" in note
+
+
+def test_who_leans_carries_no_load(shared_data, talos):
+    """It lacks a force along the ground, with which nothing pulls all the time."""
+    report = analyze(shared_data / "cases" / "lean_05cm.npz", talos)
+    assert report.summary["unexplained"]["force"][0] < -0.02 * 9.81 * report.summary["mass"]
+    assert not any("load" in note for note in report.summary["notes"])
+
+
+def test_loads_of_nothing_are_not_told(samples):
+    """A G1 that carries a box: rounding beside the largest component is 0."""
+    lost = samples["sub3_largebox_003_mj.npz"].summary["unexplained"]
+    (note,) = [
+        text for text in samples["sub3_largebox_003_mj.npz"].summary["notes"] if "load" in text
+    ]
     for value in lost["force"] + lost["torque"]:
         assert f"{value:.3g}" in note
-
-
-def test_loads_of_nothing_are_not_told(shared_data, talos):
-    """Who stands still and leans forward lacks nothing to the side but rounding."""
-    report = analyze(shared_data / "cases" / "lean_05cm.npz", talos)
-    (note,) = [note for note in report.summary["notes"] if "load" in note]
-    assert "e-" not in note
-    sideward = report.summary["unexplained"]["force"][1]
-    assert 0.0 < abs(sideward) < 1e-3
-    assert re.search(r"\((-?[\d.]+), 0, (-?[\d.]+)\) N and \(0, (-?[\d.]+), 0\) N m", note), note
+    assert missing_contacts._vector_text(np.array([1.5, 1e-16, -0.3])) == "1.5, 0, -0.3"
 
 
 def test_nothing_unexplained_is_not_mentioned(report):
