@@ -77,7 +77,7 @@ class Gatherer {
         force_(Eigen::VectorXd::Zero(contact_->cols())) {}
 
   /// @param wrench  of its parts, about its origin, in its own axes
-  /// @param force   the same force in the world
+  /// @param force   in the axes that its parts have: the ground's, where they are a sole's
   void write(Eigen::Index frame, const DynaCoM::Vector6& wrench, const Eigen::Vector3d& force,
              MotionAnalysis::Contact& result) {
     force_ = wrench.head(force_.size());
@@ -191,8 +191,10 @@ MotionAnalysis gather(const DynaCoM& robot, const std::vector<PartRobot::Part>& 
     return Eigen::Quaterniond(moved.rotation.col(frame)).toRotationMatrix();
   };
   std::vector<DynaCoM::Vector6> wrenches(names.size());
+  std::vector<Eigen::Vector3d> forces(names.size());
   for (Eigen::Index frame = 0; frame < frames; ++frame) {
     for (DynaCoM::Vector6& wrench : wrenches) wrench.setZero();
+    for (Eigen::Vector3d& force : forces) force.setZero();
     for (std::size_t k = 0; k < parts.size(); ++k) {
       const MotionAnalysis::Contact& part = analysis.contacts[k];
       if (!part.active[frame]) continue;
@@ -211,6 +213,7 @@ MotionAnalysis gather(const DynaCoM& robot, const std::vector<PartRobot::Part>& 
       // About the contact's origin.
       const Eigen::Vector3d lever =
           motions[k].position.col(frame) - contacts[owner].position.col(frame);
+      forces[owner] += part.wrench.col(frame).head<3>();
       wrenches[owner].head<3>() += force;
       wrenches[owner].tail<3>() += lever.cross(force);
     }
@@ -219,7 +222,7 @@ MotionAnalysis gather(const DynaCoM& robot, const std::vector<PartRobot::Part>& 
       const Eigen::Matrix3d axes = findRotation(contacts[k], frame).transpose();
       DynaCoM::Vector6 wrench;
       wrench << axes * wrenches[k].head<3>(), axes * wrenches[k].tail<3>();
-      gatherers[k].write(frame, wrench, wrenches[k].head<3>(), gathered[k]);
+      gatherers[k].write(frame, wrench, forces[k], gathered[k]);
     }
   }
   const double least = robot.getMinimalVerticalForce();

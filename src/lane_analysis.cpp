@@ -279,14 +279,14 @@ std::optional<LaneCarrier> LaneCarrier::make(const Carrier& carrier, int lanes) 
 LaneDistributor::LaneDistributor(const LaneCarrier& carrier, double ground_height,
                                  bool flat_horizontal_ground)
     : interface_(*carrier.interface_),
-      worker_(nullptr, interface_.destroy_sharer),
+      worker_(nullptr, interface_.destroy_distributor),
       rows_(carrier.contacts_.size()),
       is_aligned_(carrier.is_aligned_) {
   lanes::Carrier description = carrier.carrier_;
   description.contact = carrier.contacts_.data();
   description.ground_height = ground_height;
   description.flat_horizontal_ground = flat_horizontal_ground;
-  worker_.reset(interface_.create_sharer(&description));
+  worker_.reset(interface_.create_distributor(&description));
   if (!worker_) throw std::bad_alloc();
 }
 

@@ -117,9 +117,9 @@ struct Interface {
   void (*sweep)(void* sweeper, const Sweep* sweep);
   void (*destroy_sweeper)(void* sweeper);
   /// The same for a carrier.
-  void* (*create_sharer)(const Carrier* carrier);
+  void* (*create_distributor)(const Carrier* carrier);
   void (*distribute)(void* distributor, const Distributions* distributions);
-  void (*destroy_sharer)(void* sharer);
+  void (*destroy_distributor)(void* distributor);
 };
 
 constexpr int kVersion = 4;  // grows with each change to this file

@@ -5,12 +5,14 @@
 #include <cmath>
 #include <exception>
 #include <iterator>
+#include <memory>
 #include <mutex>
 #include <utility>
 
 #include "body_screening.hpp"
 #include "check.hpp"
 #include "contact_split.hpp"
+#include "dynacom/contact_point.hpp"
 #include "inference/cone_projection.hpp"
 #include "inference/contact_inference.hpp"
 #include "motion_derivation.hpp"
@@ -365,7 +367,34 @@ class MotionExaminer::Workspace::Pipeline {
     return unsure;
   }
 
+  // On a slope, points push along its normal in place of the vertical.
+  void tilt(const Eigen::Vector2d& slope, SweptMotion& swept) {
+    const Eigen::Vector3d normal(-slope.x(), -slope.y(), 1.);
+    const auto rotation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal);
+    if (!tilted_) {
+      tilted_ = *split_;
+      for (internal::FixedContact& fixed : tilted_->carrier.contacts) {
+        const auto* point = dynamic_cast<const ContactPoint*>(fixed.contact.get());
+        tilts_.push_back(point && point->getSettings().world_aligned);
+        if (!tilts_.back()) continue;
+        ContactPointSettings settings = point->getSettings();
+        settings.world_aligned = false;
+        fixed.contact = std::make_shared<ContactPoint>(settings);
+      }
+      split_ = &*tilted_;
+    }
+    for (std::size_t k = 0; k < swept.parts.size(); ++k) {
+      if (!tilts_[k]) continue;
+      swept.parts[k].rotation.colwise() = rotation.coeffs();
+      const std::size_t owner = split_->parts[k].contact;
+      // A point is its own part.
+      if (owner < swept.contacts.size() && swept.contacts[owner].name == split_->parts[k].name)
+        swept.contacts[owner].rotation.colwise() = rotation.coeffs();
+    }
+  }
+
   void distribute(const ContactInference& inference, SweptMotion& swept) {
+    if (!inference.slope.isZero(0.)) tilt(inference.slope, swept);
     const double given = settings_.detection.ground_height;
     const double ground_height =
         findMeanGround(inference, std::isnan(given) ? workspace_.robot.getGroundHeight() : given);
@@ -452,7 +481,9 @@ class MotionExaminer::Workspace::Pipeline {
   internal::StepSpeeds steps_;
   Mask near_jumps_;
   const ContactSplit* split_ = &workspace_.split;  // what carries: the contacts, or
-  std::optional<ContactSplit> links_;              // those with links besides
+  std::optional<ContactSplit> links_;              // those with links besides,
+  std::optional<ContactSplit> tilted_;             // and on a slope these, along its normal,
+  std::vector<bool> tilts_;                        // as far as they have the ground's
   std::optional<internal::MotionSweep> link_sweep_;
 };
 

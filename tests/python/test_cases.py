@@ -103,6 +103,13 @@ def test_a_slope(cases):
     assert verdict(report) == ("feasible", ["feasible"])
     assert_schedule(report, cases / "slope3.schedule.yaml", 2)
     assert note(report, "The ground is a slope of 3.0 degrees, which rises towards")
+    # Who walks steadily asks of the ground what its weight does; forces have the slope's normal.
+    active = np.asarray(report.examination.inference.schedule.active)
+    for index, contact in enumerate(report.examination.analysis.contacts):
+        whole = active[:, 4 * index : 4 * index + 4].all(axis=1)
+        usage = np.median(contact.friction_usage[whole])
+        limit = report.robot.contacts[contact.name].mu
+        assert usage == pytest.approx(np.tan(np.radians(3.0)) / limit, rel=0.01)
 
 
 def test_stairs(cases):
