@@ -45,6 +45,13 @@ BOOST_AUTO_TEST_CASE(level_ground_stairs_and_few_places_are_no_slope) {
   BOOST_TEST(findGroundSlope(stand(random, Vector2d(0.01, 0.), 12)).isZero(0.));  // half a degree
   BOOST_TEST(findGroundSlope(stand(random, Vector2d(0.2, 0.), 5)).isZero(0.));
   BOOST_TEST(findGroundSlope(Eigen::Matrix3Xd(3, 0)).isZero(0.));
+  // Two soles side by side, whose heels are up.
+  Eigen::Matrix3Xd soles(3, 8);
+  soles << -0.1, -0.1, 0.1, 0.1, -0.1, -0.1, 0.1, 0.1,  //
+      0.1, 0.2, 0.1, 0.2, -0.1, -0.2, -0.1, -0.2,       //
+      0.03, 0.03, 0., 0., 0.03, 0.03, 0., 0.;
+  BOOST_TEST(findGroundSlope(soles).isZero(0.));
+  BOOST_TEST(close(findGroundSlope(5. * soles), Vector2d(-0.15, 0.), 1e-12));
   Eigen::Matrix3Xd stairs(3, 12);
   for (Index k = 0; k < 12; ++k) stairs.col(k) << 0.1 * double(k), 0., 0.15 * double(k / 3);
   BOOST_TEST(findGroundSlope(stairs).isZero(0.));

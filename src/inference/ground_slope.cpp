@@ -10,6 +10,9 @@ namespace {
 
 // Fewer points do not show that they lie in a plane.
 constexpr Eigen::Index kPoints = 6;
+// And feet that are tilted, all alike, do not show that the ground is: points must be this far
+// apart along the slope [m].
+constexpr double kExtent = 0.5;
 // A plane is a slope from this gradient on, one degree, and this difference of heights [m], if no
 // point is farther from it than this [m], and than this part of the difference.
 constexpr double kGradient = 0.01746, kRise = 0.02, kOff = 0.02, kOffPart = 0.2;
@@ -28,6 +31,8 @@ Eigen::Vector2d findGroundSlope(const Eigen::Matrix3Xd& points) {
   const double off = (centred.col(2) - centred.leftCols<2>() * gradient).cwiseAbs().maxCoeff();
   if (gradient.norm() < kGradient || off > std::min(kOff, kOffPart * rise))
     return Eigen::Vector2d::Zero();
+  const Eigen::VectorXd along = centred.leftCols<2>() * gradient.normalized();
+  if (along.maxCoeff() - along.minCoeff() < kExtent) return Eigen::Vector2d::Zero();
   return gradient;
 }
 
