@@ -58,9 +58,8 @@ CollisionPoints find(const DynaCoM& robot, const std::string& urdf, const bp::ob
 void exposeCollisionPoints() {
   bp::class_<BodyPoints, std::shared_ptr<BodyPoints>>(
       "BodyPoints",
-      "Where a link of a robot may touch something besides the contacts: balls, of which some "
-      "have\n"
-      "the radius 0.",
+      "Where a link of a robot may touch something besides the contacts: balls, of which\n"
+      "some have the radius 0.",
       bp::no_init)
       .def("__init__", bp::make_constructor(&makeBody, bp::default_call_policies(),
                                             (bp::arg("link"), bp::arg("joint"), bp::arg("points"),

@@ -84,6 +84,7 @@ class RayPool:
                 compute=self._data.ActorPoolStrategy(min_size=1, max_size=self._jobs),
             )
             for row in dataset.iter_rows():
+                # Written by this batch's own actors, in _Actor, and carried by Ray alone.
                 reply = pickle.loads(row["reply"])
                 if isinstance(reply, DynacomError):
                     raise reply
@@ -104,6 +105,7 @@ class _Actor:
         self._pool = Pool(job, 1)
 
     def __call__(self, block: dict[str, Any]) -> dict[str, list[bytes]]:
+        # Written by the batch that started this actor, and carried by Ray alone.
         tasks = [Task(*pickle.loads(task)) for task in block["task"]]
         replies: list[Done | DynacomError] = []
         try:

@@ -11,8 +11,8 @@ from dynacom.dynacom_pywrap import DistributionStatus, MotionExamination, Motion
 
 # What is measured of forces: where one is beyond its limit, something is missing.
 _FAULTS = ("residual_force", "residual_torque", "cop_outside", "flight_with_support_needed")
-# What forces are compared with in verdicts, whatever gravity is [m/s^2].
-_STANDARD_GRAVITY = 9.81
+#: What forces are compared with in verdicts, whatever gravity is [m/s^2].
+STANDARD_GRAVITY = 9.81
 # So many intervals are told one by one.
 _LISTED = 3
 # From which mean residual on it may be a load that nobody has told of, [m g] or [m g m], and as a
@@ -52,7 +52,7 @@ def find_missing(found: MotionExamination, options: AnalysisOptions) -> dict[str
     residual = found.analysis.residual[missing & ~np.asarray(verdict.unsure)]
     largest = np.linalg.norm(residual.reshape(-1, 2, 3), axis=2).max(axis=0)
     # As the faults have it, whatever gravity is.
-    force, torque = (largest / (found.statistics.mass * _STANDARD_GRAVITY)).tolist()
+    force, torque = (largest / (found.statistics.mass * STANDARD_GRAVITY)).tolist()
     return {
         "frames": int(np.count_nonzero(missing)),
         "share": float(np.mean(missing)),

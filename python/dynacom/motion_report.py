@@ -31,7 +31,7 @@ from dynacom.dynacom_pywrap import (
     kThinnedRate,
 )
 from dynacom.errors import DynacomError
-from dynacom.missing_contacts import find_missing, missing_texts, unexplained
+from dynacom.missing_contacts import STANDARD_GRAVITY, find_missing, missing_texts, unexplained
 from dynacom.motion_file import Clip, read_motion
 from dynacom.other_contacts import body_statistics, body_texts, seat_statistics
 from dynacom.results_folder import results_folder
@@ -495,8 +495,8 @@ def _cutoff_text(derived: DerivedMotion) -> str:
 def _gravity_texts(robot: Robot) -> Iterator[str]:
     """Where it is not the Earth's."""
     gravity = -robot.model.gravity.linear[2]
-    if abs(gravity - 9.81) > 0.01:
-        yield f"Gravity is {gravity:g} m/s^2; m g is with 9.81 m/s^2 all the same."
+    if abs(gravity - STANDARD_GRAVITY) > 0.01:
+        yield f"Gravity is {gravity:g} m/s^2; m g is with {STANDARD_GRAVITY} m/s^2 all the same."
 
 
 def _unjudged_texts(found: MotionExamination) -> Iterator[str]:

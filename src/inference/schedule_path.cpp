@@ -33,6 +33,8 @@ constexpr float kImprobable = 6.f;
 struct Level {
   Mask mask;
   float cost;
+
+  static bool isCheaper(const Level& one, const Level& other) { return one.cost < other.cost; }
 };
 
 // What the points of each limb may do in a frame: nothing, or so many of its cheapest ones are
@@ -175,6 +177,7 @@ class PathFinder {
   double cost(std::size_t point, Index frame) const;
   void makeLevels(Index frame, Levels& levels);
   void makeSets(Index frame, FrameSets& sets);
+  static void combineLevels(FrameSets& sets);
   Eigen::Vector2d project(Index frame, Mask set);
   float costOf(const Eigen::Vector2d& missing, Index frame) const;
   float leastCostOf(const Eigen::Vector2d& missing, Index frame) const;
@@ -280,8 +283,7 @@ void PathFinder::makeLevels(Index frame, Levels& levels) {
   // limb that would cost most, nothing.
   while (count > kMaximalSets) {
     const auto cheapest = [](const std::vector<Level>& limb) {
-      return *std::min_element(limb.begin() + (limb.size() > 1), limb.end(),
-                               [](const Level& a, const Level& b) { return a.cost < b.cost; });
+      return *std::min_element(limb.begin() + (limb.size() > 1), limb.end(), Level::isCheaper);
     };
     auto most = std::max_element(levels.begin(), levels.end(),
                                  [](const auto& a, const auto& b) { return a.size() < b.size(); });
@@ -302,6 +304,11 @@ void PathFinder::makeLevels(Index frame, Levels& levels) {
 
 void PathFinder::makeSets(Index frame, FrameSets& sets) {
   makeLevels(frame, sets.levels);
+  combineLevels(sets);
+}
+
+// All that a frame has, as far as its levels are there.
+void PathFinder::combineLevels(FrameSets& sets) {
   sets.cost.assign(1, 0.f);
   sets.mask.assign(1, 0);
   for (const std::vector<Level>& limb : sets.levels) {
@@ -358,8 +365,7 @@ Choice PathFinder::choose(Index frame) {
   Levels& levels = one_.levels;
   makeLevels(frame, levels);
   const auto cheapest = [](const std::vector<Level>& limb) {
-    return std::min_element(limb.begin(), limb.end(),
-                            [](const Level& a, const Level& b) { return a.cost < b.cost; });
+    return std::min_element(limb.begin(), limb.end(), Level::isCheaper);
   };
   Choice choice = {0, std::numeric_limits<float>::infinity(), 0.f};
   Mask all = 0;
@@ -388,9 +394,10 @@ Choice PathFinder::choose(Index frame) {
   return choice.gap >= 0.f ? choice : chooseAmongAll(frame);
 }
 
+// The same by all sets, of the levels that choose() has made.
 Choice PathFinder::chooseAmongAll(Index frame) {
   FrameSets& sets = one_;
-  makeSets(frame, sets);
+  combineLevels(sets);
   evaluate(sets, frame, sets.size() - 1);
   std::size_t best = sets.findCheapest();
   while (!sets.is_known[best]) {
