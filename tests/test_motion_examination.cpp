@@ -14,6 +14,7 @@
 #include "dynacom/motion_examination.hpp"
 #include "feet.hpp"
 #include "random_robot.hpp"
+#include "walker.hpp"
 
 using namespace dynacom;
 using namespace dynacom_tests;
@@ -363,4 +364,63 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_examined_is_refused) {
             [](std::size_t, const MotionExamination*, const std::string&) {});
       },
       {"initialize"}));
+}
+
+BOOST_AUTO_TEST_CASE(on_a_ramp_forces_have_its_normal_and_elsewhere_nothing_changes) {
+  const Walker walker;
+  constexpr double degrees = 12.;
+  const RecordedMotion recorded = walker.walk(Walker::walkAhead(ramp(degrees, 0.65, 1.6), 11));
+  const MotionExamination found = examineMotion(*walker.robot, recorded, {});
+  const Index frames = recorded.time.size();
+  std::vector<std::vector<bool>> on_slope(8, std::vector<bool>(std::size_t(frames), false));
+  for (const Stance& stance : found.inference.stances)
+    for (Index frame = stance.begin; frame < stance.end; ++frame)
+      on_slope[stance.part][std::size_t(frame)] = !stance.slope.isZero(0.);
+
+  // The same with points that push along the vertical everywhere.
+  const PartRobot split = splitContacts(*walker.robot);
+  DynaCoM robot = split.robot;
+  robot.setGroundHeight(
+      found.inference.schedule.active.select(found.inference.ground.array(), 0.).sum() /
+      double(found.inference.schedule.active.count()));
+  AnalysisSettings settings;
+  const MotionAnalysis vertical =
+      analyzeMotion(robot, found.derived.motion, found.inference.schedule, settings);
+
+  const double gradient = std::tan(degrees * std::acos(-1.) / 180.);
+  Index level = 0, steep = 0;
+  for (Index frame = 0; frame < frames; ++frame) {
+    bool any = false, all = true;
+    for (std::size_t k = 0; k < 8; ++k)
+      if (found.inference.schedule.active(Index(k), frame)) {
+        any = any || on_slope[k][std::size_t(frame)];
+        all = all && on_slope[k][std::size_t(frame)];
+      }
+    const Vector3d force = found.analysis.ground_force.col(frame);
+    for (std::size_t k = 0; k < 8; ++k) {
+      const MotionAnalysis::Contact& part = found.analysis.parts[k];
+      if (!part.active[frame]) continue;
+      const Vector3d normal =
+          Eigen::Quaterniond(Eigen::Vector4d(found.part_motions[k].rotation.col(frame))) *
+          Vector3d::UnitZ();
+      const Vector2d slope = -normal.head<2>() / normal.z();
+      BOOST_TEST(close(slope, Vector2d(on_slope[k][std::size_t(frame)] ? gradient : 0., 0.), 1e-3));
+    }
+    if (!any) {
+      ++level;
+      for (std::size_t k = 0; k < 8; ++k)
+        BOOST_TEST((found.analysis.parts[k].wrench.col(frame).array() ==
+                    vertical.contacts[k].wrench.col(frame).array())
+                       .all());
+    } else if (all && found.analysis.status[std::size_t(frame)] == DistributionStatus::Solved &&
+               std::abs(force.x()) < 1e-6 && std::abs(force.y()) < 1e-6) {
+      // Who stands still asks of the ground what its weight does.
+      ++steep;
+      for (const MotionAnalysis::Contact& contact : found.analysis.contacts)
+        if (contact.active[frame])
+          BOOST_TEST(close(contact.friction_usage[frame], gradient / 0.7, 2e-3));
+    }
+  }
+  BOOST_TEST(level > frames / 4);
+  BOOST_TEST(steep > 100);
 }
