@@ -58,7 +58,7 @@ def terrain_texts(
             + (" on a ground that moves so" if velocity.any() else "")
             + ": where the ground is, is not known."
         )
-    elif slope := _slope_text(found):
+    elif slope := _slope_text(robot, found):
         yield slope
     else:
         yield from _level_texts(robot, found, known)
@@ -95,17 +95,34 @@ def _used(found: MotionExamination) -> Iterator[Stance]:
             yield stance
 
 
-def _slope_text(found: MotionExamination) -> str | None:
-    """If the stances lie in a plane that is not level."""
-    gradient = found.inference.slope
-    if not gradient.any():
+def _slope_text(robot: Robot, found: MotionExamination) -> str | None:
+    """If some stances are on ground that is not level."""
+    if (gradient := found.inference.slope).any():
+        towards = np.degrees(np.arctan2(gradient[1], gradient[0]))
+        return (
+            f"The ground is a slope of {_angle(gradient):.1f} degrees, which rises towards "
+            f"{_text(towards, 0)} degrees from the world's x axis."
+        )
+    owners = _owners(robot, found)
+    angles: dict[str, set[str]] = {}
+    for stance in _used(found):
+        if (gradient := stance.slope).any():
+            angles.setdefault(owners[stance.part], set()).add(f"{_angle(gradient):.1f}")
+    if not angles:
         return None
-    angle = np.degrees(np.arctan(np.linalg.norm(gradient)))
-    towards = np.degrees(np.arctan2(gradient[1], gradient[0]))
+    texts = []
+    for name, own in angles.items():
+        *first, last = sorted(own, key=float)
+        texts.append(f"{name} on {', '.join(first)}{' and ' if first else ''}{last} degrees")
     return (
-        f"The ground is a slope of {angle:.1f} degrees, which rises towards {_text(towards, 0)} "
-        "degrees from the world's x axis."
+        f"Slopes are stood on, by {'; by '.join(texts)}. Where else they stand, the ground is "
+        "taken for level."
     )
+
+
+def _angle(gradient: np.ndarray) -> float:
+    """Of a slope [degrees]."""
+    return float(np.degrees(np.arctan(np.linalg.norm(gradient))))
 
 
 def _level_texts(robot: Robot, found: MotionExamination, known: dict[str, float]) -> Iterator[str]:

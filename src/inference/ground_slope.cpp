@@ -29,10 +29,13 @@ constexpr double kNarrow = 0.02;
 constexpr double kScatter = 0.007;
 // What a level costs that is stood on, what a slope costs, and what a footing costs at the most:
 // one alone, whose tilt is whatever, pays for no slope.
-constexpr double kLevel = 2., kSlope = 6., kUnknown = 6.;
+constexpr double kLevel = 2., kSlope = 8., kUnknown = 6.;
 // A slope must save so much for each footing of the neighbours that it is first seen in: who walks
 // where it is level stands a bit better on a plane than on a level, but by less.
 constexpr double kSeen = 0.3;
+// Of the soles that are tilted like a slope, such a part must be on one: feet that are tilted
+// wherever they stand rise and fall from step to step at times as if they were on slopes.
+constexpr double kTilted = 0.7;
 // How often planes are fitted to what they explain, which then may be more or less.
 constexpr int kRounds = 3;
 // Levels that differ by more are never one [m].
@@ -66,6 +69,10 @@ struct Moments {
   double findTilt(const Eigen::Vector2d& gradient) const {
     const Eigen::Vector3d down(-gradient.x(), -gradient.y(), 1.);
     return std::max(down.dot(scatter * down), 0.) / count;
+  }
+  // Whether they are closer to such a gradient than to a level.
+  bool isTilted(const Eigen::Vector2d& gradient) const {
+    return findTilt(gradient) < 0.25 * findTilt(Eigen::Vector2d::Zero());
   }
   double findCost(const Plane& plane) const {
     return (square(plane.findOff(mean)) + findTilt(plane.gradient)) / square(kScatter);
@@ -106,6 +113,7 @@ class SlopeFinder {
   std::vector<Eigen::Vector2d> find() {
     choose(findCandidates());
     assign();
+    dropDoubtful();
     std::vector<Eigen::Vector2d> slopes(footings_.size(), Eigen::Vector2d::Zero());
     for (const Slope& slope : slopes_)
       for (const std::size_t k : slope.members) slopes[k] = slope.plane.gradient;
@@ -127,6 +135,7 @@ class SlopeFinder {
   std::vector<Slope> findCandidates() const;
   void choose(std::vector<Slope> candidates);
   void assign();
+  void dropDoubtful();
 
   const std::vector<Footing>& footings_;
   std::size_t contacts_ = 0;
@@ -209,9 +218,7 @@ bool SlopeFinder::isSlope(const Slope& slope) const {
   double low = inf, high = -inf, begin = inf, end = -inf, off = 0., points = 0.;
   for (const std::size_t k : slope.members) {
     // A sole that is level, rather than tilted as the plane is, shows no more than a point does.
-    const Moments& own = moments_[k];
-    const bool tilts = own.findTilt(gradient) < 0.25 * own.findTilt(Eigen::Vector2d::Zero());
-    points += tilts ? own.count : 1.;
+    points += moments_[k].isTilted(gradient) ? moments_[k].count : 1.;
     for (const auto point : footings_[k].points.colwise()) {
       off = std::max(off, std::abs(slope.plane.findOff(point)));
       low = std::min(low, point.z());
@@ -312,6 +319,28 @@ void SlopeFinder::assign() {
     slopes_.erase(std::remove_if(slopes_.begin(), slopes_.end(),
                                  [&](const Slope& slope) { return !isSlope(slope); }),
                   slopes_.end());
+  }
+}
+
+// Leaves slopes whose tilt soles have as well where there is no slope.
+void SlopeFinder::dropDoubtful() {
+  const auto isDoubtful = [&](const Slope& slope) {
+    std::vector<bool> tilted(footings_.size());
+    double all = 0., here = 0.;
+    for (std::size_t k = 0; k < tilted.size(); ++k)
+      if ((tilted[k] = moments_[k].isTilted(slope.plane.gradient))) ++all;
+    for (const Slope& other : slopes_)
+      for (const std::size_t k : other.members)
+        if (tilted[k]) ++here;
+    return here < kTilted * all;
+  };
+  for (std::size_t number = 0; number < slopes_.size();) {
+    if (isDoubtful(slopes_[number])) {
+      slopes_.erase(slopes_.begin() + std::ptrdiff_t(number));
+      number = 0;
+    } else {
+      ++number;
+    }
   }
 }
 
