@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "../check.hpp"
 #include "../nan.hpp"
@@ -101,12 +102,13 @@ void writeSlopes(const std::vector<PartRobot::Part>& parts,
     return one->first < other->first;
   });
   std::vector<internal::Footing> footings;
-  std::vector<std::size_t> last, whose;  // of a contact and of a stance, an index of these
-  std::vector<Index> behind;             // of footings, as far as they are known
+  std::vector<Index> behind;                // the frame at which each ends
+  std::vector<std::size_t> whose;           // of each stance, the footing that it belongs to
+  std::map<std::size_t, std::size_t> last;  // of each contact, its latest footing
   for (const Stance* stance : used) {
     const std::size_t contact = parts[stance->part].contact;
-    if (contact >= last.size()) last.resize(contact + 1, footings.max_size());
-    if (last[contact] == footings.max_size() || stance->first >= behind[last[contact]]) {
+    const auto own = last.find(contact);
+    if (own == last.end() || stance->first >= behind[own->second]) {
       last[contact] = footings.size();
       footings.push_back({contact, {}});
       behind.push_back(stance->behind);

@@ -17,8 +17,8 @@ struct Footing {
 /// Ground is made of levels and of planes that are not level. It is explained at the least cost:
 /// what footings are off it, and so much for each level and each plane (minimum description length,
 /// Rissanen 1978). Planes are tried through neighbours in time, and added as long as they pay, each
-/// the one that saves most. A sole that is tilted shows nothing by itself: a plane is a slope if the
-/// rise from footing to footing agrees, over half a metre.
+/// the one that saves most. A sole that is tilted shows nothing by itself: a plane is a slope if
+/// the rise from footing to footing agrees, over half a metre.
 /// @param footings  in the order of time, no contact's number being large
 std::vector<Eigen::Vector2d> findGroundSlopes(const std::vector<Footing>& footings);
 
