@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "cone_projection.hpp"
 
@@ -146,6 +147,7 @@ class PathFinder {
     found_.sets.resize(static_cast<std::size_t>(frames));
     found_.probability.setZero(Index(points_.size()), frames);
     found_.missing.resize(2, frames);
+    projected_.resize(static_cast<std::size_t>(frames));
     const std::vector<bool> certain = chooseCertain();
     for (Index first = 0; first < frames; ++first) {
       if (certain[static_cast<std::size_t>(first)]) {
@@ -178,11 +180,11 @@ class PathFinder {
   void makeLevels(Index frame, Levels& levels);
   void makeSets(Index frame, FrameSets& sets);
   static void combineLevels(FrameSets& sets);
-  Eigen::Vector2d project(Index frame, Mask set);
+  Eigen::Vector2d findMissing(Index frame, Mask set);
   float costOf(const Eigen::Vector2d& missing, Index frame) const;
   float leastCostOf(const Eigen::Vector2d& missing, Index frame) const;
   void evaluate(FrameSets& sets, Index frame, std::size_t number) {
-    const Eigen::Vector2d missing = project(frame, sets.mask[number]);
+    const Eigen::Vector2d missing = findMissing(frame, sets.mask[number]);
     sets.setMissing(number, costOf(missing, frame), leastCostOf(missing, frame));
   }
   float changeOf(Mask before, Mask after) const;
@@ -210,7 +212,8 @@ class PathFinder {
   std::vector<std::vector<int>> limbs_;  // points of each
   std::vector<Mask> limb_masks_;
   ConeProjection projection_;
-  Index placed_ = -1;  // the frame of the levers
+  std::vector<std::vector<std::pair<Mask, Eigen::Vector2d>>> projected_;  // what is known, by frame
+  Index placed_ = -1;                                                     // the frame of the levers
   Eigen::Matrix3Xd levers_;
   std::vector<std::pair<double, int>> order_;  // of a limb's points
   FrameSets one_;                              // of a frame by itself
@@ -325,8 +328,13 @@ void PathFinder::combineLevels(FrameSets& sets) {
   sets.is_known.assign(sets.size(), false);
 }
 
-// What a set cannot give in a frame: norms of force [m g] and moment [m g m].
-Eigen::Vector2d PathFinder::project(Index frame, Mask set) {
+// What a set cannot give in a frame: norms of force [m g] and moment [m g m]. It is asked for again
+// where a frame's own choice is not certain.
+Eigen::Vector2d PathFinder::findMissing(Index frame, Mask set) {
+  std::vector<std::pair<Mask, Eigen::Vector2d>>& known =
+      projected_[static_cast<std::size_t>(frame)];
+  for (const auto& [other, missing] : known)
+    if (other == set) return missing;
   if (placed_ != frame)
     for (std::size_t k = 0; k < points_.size(); ++k)
       levers_.col(Index(k)) = points_[k].position.col(frame) - wrench_.com.col(frame);
@@ -334,7 +342,8 @@ Eigen::Vector2d PathFinder::project(Index frame, Mask set) {
   ConeProjection::Vector6 wrench;
   wrench << wrench_.force.col(frame), wrench_.torque.col(frame);
   const auto residual = projection_.project(wrench / weight_, levers_, mu_, set);
-  return {residual.force, residual.torque};
+  known.emplace_back(set, Eigen::Vector2d(residual.force, residual.torque));
+  return known.back().second;
 }
 
 float PathFinder::costOf(const Eigen::Vector2d& missing, Index frame) const {
@@ -373,11 +382,11 @@ Choice PathFinder::choose(Index frame) {
     choice.set |= cheapest(limb)->mask;
     all |= limb.back().mask;
   }
-  found_.missing.col(frame) = project(frame, choice.set);
+  found_.missing.col(frame) = findMissing(frame, choice.set);
   float excess = costOf(found_.missing.col(frame), frame);
   if (!std::isfinite(excess)) return {choice.set, 0.f, 0.f};
   if (excess > negligible(frame) && all != choice.set)
-    excess -= leastCostOf(project(frame, all), frame);
+    excess -= leastCostOf(findMissing(frame, all), frame);
   // A subset of all points may trade force for moment, and so cost less than all of them, which can
   // be no more than hundredths.
   if (all == choice.set || excess <= negligible(frame)) excess = 0.f;
@@ -404,7 +413,7 @@ Choice PathFinder::chooseAmongAll(Index frame) {
     evaluate(sets, frame, best);
     best = sets.findCheapest();
   }
-  found_.missing.col(frame) = project(frame, sets.mask[best]);
+  found_.missing.col(frame) = findMissing(frame, sets.mask[best]);
   Choice choice = {sets.mask[best], std::numeric_limits<float>::infinity(), 0.f};
   choice.ratio = choice.gap;
   for (std::size_t other = 0; other < sets.size(); ++other) {
@@ -495,7 +504,7 @@ void PathFinder::findBetween(Index first, Index behind) {
   forEach([&](FrameSets& sets, Index frame) {
     const Mask set = sets.mask[path[static_cast<std::size_t>(frame - from)]];
     found_.sets[static_cast<std::size_t>(frame)] = set;
-    found_.missing.col(frame) = project(frame, set);
+    found_.missing.col(frame) = findMissing(frame, set);
   });
 
   while (findProbability(from, to)) continue;
