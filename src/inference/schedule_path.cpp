@@ -308,6 +308,11 @@ void PathFinder::makeLevels(Index frame, Levels& levels) {
 void PathFinder::makeSets(Index frame, FrameSets& sets) {
   makeLevels(frame, sets.levels);
   combineLevels(sets);
+  for (const auto& [set, missing] : projected_[static_cast<std::size_t>(frame)]) {
+    const auto place = std::find(sets.mask.begin(), sets.mask.end(), set) - sets.mask.begin();
+    sets.setMissing(static_cast<std::size_t>(place), costOf(missing, frame),
+                    leastCostOf(missing, frame));
+  }
 }
 
 // All that a frame has, as far as its levels are there.
