@@ -2,22 +2,15 @@
 #include "lanes.hpp"
 
 #include <algorithm>
-#include <experimental/simd>
-#include <limits>
 #include <new>
 #include <vector>
+
+#include "lane_math.hpp"
+#include "lane_newton.hpp"
 
 namespace dynacom::lanes {
 namespace {
 
-namespace stdx = std::experimental;
-
-// A number of each frame, and whether something is so in each.
-using Lanes = stdx::native_simd<double>;
-using Mask = Lanes::mask_type;
-constexpr int kLanes = static_cast<int>(Lanes::size());
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // By how much a quaternion's squared norm may differ from 1: more, and algorithms differ.
 constexpr double kNormalized = 1e-12;
 // From which angle on sine and cosine of stdx overflow [rad].
@@ -26,171 +19,14 @@ constexpr double kLargestAngle = 1e9;
 constexpr double kFullRank = 1e-6;
 // What part of the wrench an answer may lack.
 constexpr double kMissing = 1e-12;
-
-// Vectors and matrices in three dimensions, the latter by their columns.
-struct Vector {
-  Lanes x, y, z;
-};
-struct Matrix {
-  Vector x, y, z;
-};
-
-inline Vector operator+(const Vector& a, const Vector& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-inline Vector operator-(const Vector& a, const Vector& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-inline Vector operator*(const Lanes& s, const Vector& a) { return {s * a.x, s * a.y, s * a.z}; }
-inline Vector& operator+=(Vector& a, const Vector& b) { return a = a + b; }
-inline Lanes dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vector cross(const Vector& a, const Vector& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-inline Vector operator*(const Matrix& m, const Vector& a) {
-  return a.x * m.x + a.y * m.y + a.z * m.z;
-}
-inline Matrix operator*(const Matrix& m, const Matrix& n) { return {m * n.x, m * n.y, m * n.z}; }
-inline Vector transposed(const Matrix& m, const Vector& a) {
-  return {dot(m.x, a), dot(m.y, a), dot(m.z, a)};
-}
-inline Vector broadcast(const double* a) { return {a[0], a[1], a[2]}; }
-inline Matrix broadcastMatrix(const double* m) {
-  return {broadcast(m), broadcast(m + 3), broadcast(m + 6)};
-}
-inline Vector zero() { return {0., 0., 0.}; }
-inline Matrix identity() { return {{1., 0., 0.}, {0., 1., 0.}, {0., 0., 1.}}; }
-
-// As Eigen has it.
-inline Matrix rotationOf(const Lanes& x, const Lanes& y, const Lanes& z, const Lanes& w) {
-  const Lanes tx = 2. * x, ty = 2. * y, tz = 2. * z;
-  const Lanes xx = tx * x, xy = tx * y, xz = tx * z, yy = ty * y, yz = ty * z, zz = tz * z;
-  const Lanes wx = tx * w, wy = ty * w, wz = tz * w;
-  return {{1. - (yy + zz), xy + wz, xz - wy},
-          {xy - wz, 1. - (xx + zz), yz + wx},
-          {xz + wy, yz - wx, 1. - (xx + yy)}};
-}
-
-// The quaternion (x, y, z, w), as Eigen has it: by its largest component, or by w where the trace
-// is positive.
-inline void findQuaternion(const Matrix& m, Lanes (&quaternion)[4]) {
-  const Lanes xx = m.x.x, yy = m.y.y, zz = m.z.z;
-  const Lanes trace = xx + yy + zz;
-  // Four times the product of each component with the one that is chosen.
-  Lanes square = 1. + trace;
-  Lanes x = m.y.z - m.z.y, y = m.z.x - m.x.z, z = m.x.y - m.y.x, w = square;
-  const auto choose = [&](const Mask& mask, const Lanes& chosen, const Lanes& with_x,
-                          const Lanes& with_y, const Lanes& with_z, const Lanes& with_w) {
-    stdx::where(mask, square) = chosen;
-    stdx::where(mask, x) = with_x;
-    stdx::where(mask, y) = with_y;
-    stdx::where(mask, z) = with_z;
-    stdx::where(mask, w) = with_w;
-  };
-  const Lanes xy = m.x.y + m.y.x, xz = m.x.z + m.z.x, yz = m.y.z + m.z.y;
-  const Lanes from_x = x, from_y = y, from_z = z;
-  const Mask other = !(trace > 0.);
-  const Mask by_y = other && yy > xx && yy >= zz, by_z = other && zz > xx && zz > yy;
-  const Mask by_x = other && !by_y && !by_z;
-  const Lanes square_x = 1. + xx - yy - zz, square_y = 1. + yy - zz - xx,
-              square_z = 1. + zz - xx - yy;
-  choose(by_x, square_x, square_x, xy, xz, from_x);
-  choose(by_y, square_y, xy, square_y, yz, from_y);
-  choose(by_z, square_z, xz, yz, square_z, from_z);
-  const Lanes scale = 0.5 / stdx::sqrt(square);
-  quaternion[0] = scale * x;
-  quaternion[1] = scale * y;
-  quaternion[2] = scale * z;
-  quaternion[3] = scale * w;
-}
+// ε of Newton's method: less, if the answer that it leads to is none.
+constexpr double kSlacks[][2] = {{1e-3, 1e-6}, {1e-4, 1e-8}};
 
 // How a joint's frame moves, in the world's axes: velocity and acceleration are those of its origin
 // as a point.
 struct Moving {
   Matrix rotation;
   Vector position, angular_velocity, velocity, angular_acceleration, acceleration;
-};
-
-// L D Lᵀ of a symmetric 6 × 6 matrix, in place: L below the diagonal, 1/D on it.
-struct Factors {
-  Lanes m[6][6];
-  Lanes least_pivot, largest_pivot;
-
-  void compute() {
-    for (int j = 0; j < 6; ++j) {
-      const Lanes pivot = m[j][j];
-      least_pivot = j == 0 ? pivot : stdx::min(least_pivot, pivot);
-      largest_pivot = j == 0 ? pivot : stdx::max(largest_pivot, pivot);
-      const Lanes inverse = 1. / pivot;
-      m[j][j] = inverse;
-      Lanes column[6];
-      for (int i = j + 1; i < 6; ++i) {
-        column[i] = m[i][j];
-        m[i][j] *= inverse;
-      }
-      for (int i = j + 1; i < 6; ++i)
-        for (int k = j + 1; k <= i; ++k) m[i][k] -= m[i][j] * column[k];
-    }
-  }
-
-  void solve(Lanes* x) const {
-    for (int j = 0; j < 6; ++j)
-      for (int i = j + 1; i < 6; ++i) x[i] -= m[i][j] * x[j];
-    for (int j = 0; j < 6; ++j) x[j] *= m[j][j];
-    for (int j = 5; j > 0; --j)
-      for (int i = 0; i < j; ++i) x[i] -= m[j][i] * x[j];
-  }
-};
-
-// The frames at hand: as many as there are lanes, or those that are left.
-class Block {
- protected:
-  void take(std::ptrdiff_t first, std::ptrdiff_t count) {
-    first_ = first;
-    count_ = static_cast<int>(std::min<std::ptrdiff_t>(kLanes, count - first));
-  }
-  // Lanes that are too many do what the last one does.
-  std::ptrdiff_t frameOf(int lane) const { return first_ + std::min(lane, count_ - 1); }
-
-  // Reads columns.
-  template <int kRows>
-  void load(const double* columns, Lanes (&values)[kRows]) const {
-    for (int row = 0; row < kRows; ++row)
-      values[row] = Lanes([&](auto lane) { return columns[frameOf(lane) * kRows + row]; });
-  }
-  Vector loadVector(const double* columns) const {
-    Lanes values[3];
-    load(columns, values);
-    return {values[0], values[1], values[2]};
-  }
-
-  template <int kRows>
-  void store(double* columns, const Lanes (&values)[kRows]) const {
-    double buffer[kRows][kLanes];
-    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
-    double* column = columns + first_ * kRows;
-    for (int lane = 0; lane < count_; ++lane, column += kRows)
-      for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
-  }
-  void store(double* columns, const Vector& values) const {
-    store(columns, {values.x, values.y, values.z});
-  }
-  // The same, where something is so.
-  template <int kRows>
-  void storeWhere(const Mask& mask, double* columns, const Lanes (&values)[kRows]) const {
-    double buffer[kRows][kLanes];
-    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
-    double* column = columns + first_ * kRows;
-    for (int lane = 0; lane < count_; ++lane, column += kRows)
-      if (mask[lane])
-        for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
-  }
-  void store(bool* values, const Mask& mask) const {
-    for (int lane = 0; lane < count_; ++lane) values[first_ + lane] = mask[lane];
-  }
-
-  std::ptrdiff_t first_ = 0;
-  int count_ = 0;
 };
 
 // ---- What a motion needs, and how its contacts lie and move ----
@@ -469,26 +305,33 @@ class Distributor : Block {
   explicit Distributor(const Carrier& carrier)
       : carrier_(carrier),
         contacts_(carrier.contact, carrier.contact + carrier.contacts),
-        standing_(contacts_.size()) {}
+        standing_(contacts_.size()),
+        newton_(contacts_) {
+    const double* D = carrier.wrench_weights;
+    spread_ = *std::max_element(D, D + 6) / *std::min_element(D, D + 6);
+    minimal_scale_ = carrier.minimal_scale * *std::max_element(D, D + 3);
+  }
 
+  // First the forces that no inequality holds back. Frames without an answer are gathered, so that
+  // none waits for others that have theirs.
   void run(const Distributions& distributions) {
+    left_.clear();
     for (std::ptrdiff_t first = 0; first < distributions.count; first += kLanes) {
       take(first, distributions.count);
-      com_ = loadVector(distributions.com);
-      force_ = loadVector(distributions.force);
-      torque_ = loadVector(distributions.torque);
-      const Lanes wrench[6] = {force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z};
-      for (int i = 0; i < 6; ++i) wrench_[i] = wrench[i];
-      bool any = false;
-      for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        stand(distributions.contacts[k], standing_[k]);
-        any = any || standing_[k].takes_part;
-      }
+      takeProblem(distributions);
       if (carrier_.flat_horizontal_ground) findCentreOfPressure(distributions);
-      if (any)
-        distribute(distributions);
-      else
-        store(distributions.answered, Mask(false));
+      write(distributions, is_carried_ && findFreeForces(), Mask(true));
+    }
+    for (const double(&slacks)[2] : kSlacks) {
+      candidates_.swap(left_);
+      left_.clear();
+      newton_.forget();
+      for (std::size_t first = 0; first < candidates_.size(); first += kLanes) {
+        take(candidates_, static_cast<std::ptrdiff_t>(first));
+        takeProblem(distributions);
+        const Mask answered = findBoundForces(slacks);
+        write(distributions, answered, newton_.isReached());
+      }
     }
   }
 
@@ -501,26 +344,48 @@ class Distributor : Block {
     Vector lever;     // from the CoM to the surface's origin
     Vector moments[3];
     Lanes force[6];
+    Lanes ease;  // of its forces: √ρ, over the largest weight of all
   };
 
+  void takeProblem(const Distributions& distributions);
   void stand(const ContactRows& rows, Standing& standing) const;
   void findCentreOfPressure(const Distributions& distributions) const;
-  Mask findForces();
-  void distribute(const Distributions& distributions);
-  void storeContact(const Distributions& distributions, std::size_t k, const Mask& answered) const;
+  Mask findFreeForces();
+  Mask findBoundForces(const double (&slacks)[2]);
+  void write(const Distributions& distributions, const Mask& answered, const Mask& reached);
+  void writeMeanPressure(const Distributions& distributions, const Mask& answered) const;
+  void writeContact(const Distributions& distributions, std::size_t k, const Mask& answered) const;
 
   const Carrier carrier_;
   const std::vector<Contact> contacts_;
+  double spread_;                   // the largest wrench weight over the least
+  double minimal_scale_;            // of weighted wrenches
   std::vector<Standing> standing_;  // by contact
+  DualNewton newton_;
+  std::vector<std::ptrdiff_t> left_, candidates_;  // frames without an answer, now and before
 
   // Of the frames at hand.
   Vector com_, force_, torque_;
   Lanes wrench_[6], achieved_[6];
+  Mask is_carried_;  // by any contact
 };
+
+void Distributor::takeProblem(const Distributions& distributions) {
+  com_ = loadVector(distributions.com);
+  force_ = loadVector(distributions.force);
+  torque_ = loadVector(distributions.torque);
+  const Lanes wrench[6] = {force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z};
+  for (int i = 0; i < 6; ++i) wrench_[i] = wrench[i];
+  is_carried_ = Mask(false);
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    stand(distributions.contacts[k], standing_[k]);
+    if (standing_[k].takes_part) is_carried_ = is_carried_ || standing_[k].is_active > 0.;
+  }
+}
 
 void Distributor::stand(const ContactRows& rows, Standing& standing) const {
   bool any = false;
-  for (int lane = 0; lane < count_; ++lane) any = any || rows.active[first_ + lane];
+  for (int lane = 0; lane < count_; ++lane) any = any || rows.active[frameOf(lane)];
   standing.takes_part = any;
   if (!any) return;
   standing.is_active = Lanes([&](auto lane) {
@@ -553,7 +418,7 @@ void Distributor::findCentreOfPressure(const Distributions& distributions) const
 
 // The cheapest forces that give the wrench, whatever inequalities say: the multipliers ν solve
 // NE W⁻² NEᵀ ν = w, and λ = W⁻² NEᵀ ν. Says where all inequalities hold.
-Mask Distributor::findForces() {
+Mask Distributor::findFreeForces() {
   const double* D = carrier_.wrench_weights;
   Factors factors;
   Lanes compliance[6][6];
@@ -643,22 +508,87 @@ Mask Distributor::findForces() {
   return answered && distance <= kMissing * kMissing * size;
 }
 
-void Distributor::distribute(const Distributions& distributions) {
-  const Mask answered = findForces();
-  store(distributions.answered, answered);
+// The cheapest forces within their cones that give the wrench, or the closest one to it.
+Mask Distributor::findBoundForces(const double (&slacks)[2]) {
+  const double* D = carrier_.wrench_weights;
+  Wrench target;
+  Lanes size = 0., weighted_size = 0., largest_weight = 0.;
+  for (int i = 0; i < 6; ++i) {
+    target[i] = D[i] * wrench_[i];
+    size += wrench_[i] * wrench_[i];
+    weighted_size += target[i] * target[i];
+  }
+  weighted_size = stdx::sqrt(weighted_size);
+  const Lanes scale = stdx::max(weighted_size, Lanes(minimal_scale_));
+  const Lanes overall_weight = weighted_size / stdx::sqrt(size);
+  for (int i = 0; i < 6; ++i) target[i] /= scale;
+
+  // By readiness ρ, W is 1 / √ρ times the contact's weights, over the largest of all.
+  std::vector<Cone>& cones = newton_.cones();
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    const Standing& standing = standing_[k];
+    if (!standing.takes_part) continue;
+    const double* weights = contacts_[k].weights;
+    const Lanes weight =
+        *std::max_element(weights, weights + contacts_[k].size) / stdx::sqrt(standing.is_active);
+    stdx::where(standing.is_active > 0. && weight > largest_weight, largest_weight) = weight;
+  }
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    Standing& standing = standing_[k];
+    Cone& cone = cones[k];
+    cone.is_there = standing.takes_part;
+    if (!standing.takes_part) continue;
+    const Vector* axes[3] = {&standing.rotation.x, &standing.rotation.y, &standing.rotation.z};
+    standing.ease = largest_weight * stdx::sqrt(standing.is_active);
+    for (int i = 0; i < cone.size; ++i) {
+      const Vector& force = i < 3 ? *axes[i] : zero();
+      const Vector& moment = i < 3 ? standing.moments[i] : *axes[i - 3];
+      const Lanes factor = standing.ease / (contacts_[k].weights[i] * overall_weight);
+      cone.e[i] = {{D[0] * factor * force.x, D[1] * factor * force.y, D[2] * factor * force.z,
+                    D[3] * factor * moment.x, D[4] * factor * moment.y, D[5] * factor * moment.z}};
+    }
+  }
+
+  const Mask answered = newton_.solve(target, spread_, slacks, Mask(true));
+  const Lanes unit = scale / overall_weight;
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    Standing& standing = standing_[k];
+    if (!standing.takes_part) continue;
+    for (int i = 0; i < 6; ++i)
+      standing.force[i] = i < contacts_[k].size
+                              ? unit * standing.ease / contacts_[k].weights[i] * cones[k].force[i]
+                              : Lanes(0.);
+  }
+  for (int i = 0; i < 6; ++i) achieved_[i] = scale / D[i] * newton_.achieved()[i];
+  return answered;
+}
+
+// Writes the forces at hand where they are an answer.
+void Distributor::write(const Distributions& distributions, const Mask& answered,
+                        const Mask& reached) {
+  for (int lane = 0; lane < count_; ++lane) {
+    const std::ptrdiff_t frame = frameOf(lane);
+    const Answer answer = reached[lane] ? Answer::Solved : Answer::Relaxed;
+    distributions.answers[frame] = answered[lane] ? answer : Answer::None;
+    if (!answered[lane] && is_carried_[lane]) left_.push_back(frame);
+  }
   const Lanes inverse_mass = 1. / carrier_.mass;
   const Vector acom =
       inverse_mass * Vector{achieved_[0], achieved_[1], achieved_[2]} + broadcast(carrier_.gravity);
-  store(distributions.feasible_acom, acom);
-  store(distributions.feasible_dam, Vector{achieved_[3], achieved_[4], achieved_[5]});
+  storeWhere(answered, distributions.feasible_acom, acom);
+  storeWhere(answered, distributions.feasible_dam,
+             Vector{achieved_[3], achieved_[4], achieved_[5]});
   Lanes residual[6];
   for (int i = 0; i < 6; ++i) residual[i] = wrench_[i] - achieved_[i];
-  store(distributions.residual, residual);
+  storeWhere(answered, distributions.residual, residual);
   for (std::size_t k = 0; k < contacts_.size(); ++k)
-    if (standing_[k].takes_part) storeContact(distributions, k, answered);
+    if (standing_[k].takes_part) writeContact(distributions, k, answered);
+  if (!carrier_.flat_horizontal_ground) writeMeanPressure(distributions, answered);
+}
 
-  if (carrier_.flat_horizontal_ground) return;
-  // The mean of the contacts' own centres of pressure, weighted by their vertical forces (6).
+// The mean of the contacts' own centres of pressure, weighted by their vertical forces (6).
+void Distributor::writeMeanPressure(const Distributions& distributions,
+                                    const Mask& answered) const {
   Vector moment = zero();
   Lanes vertical_force = 0.;
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -666,9 +596,10 @@ void Distributor::distribute(const Distributions& distributions) {
     if (!standing.takes_part) continue;
     const Lanes* f = standing.force;
     const Matrix& R = standing.rotation;
-    Lanes inverse = 1. / f[2];
-    stdx::where(standing.is_active == 0., inverse) = 0.;
-    const Lanes vertical = R.x.z * f[0] + R.y.z * f[1] + R.z.z * f[2];
+    const Mask is_loaded = standing.is_active > 0. && f[2] > 0.;
+    Lanes inverse = 0., vertical = 0.;
+    stdx::where(is_loaded, inverse) = 1. / f[2];
+    stdx::where(is_loaded, vertical) = R.x.z * f[0] + R.y.z * f[1] + R.z.z * f[2];
     const Vector centre = com_ + standing.lever + (-f[4] * inverse) * R.x + (f[3] * inverse) * R.y;
     moment += vertical * centre;
     vertical_force += vertical;
@@ -678,11 +609,11 @@ void Distributor::distribute(const Distributions& distributions) {
       !(vertical_force >= carrier_.minimal_vertical_force) || !(0. * (x + y) == 0.);
   stdx::where(undefined, x) = kNaN;
   stdx::where(undefined, y) = kNaN;
-  store(distributions.cop, {x, y});
+  storeWhere<2>(answered, distributions.cop, {x, y});
 }
 
 // As ContactBase and DynaCoM have it.
-void Distributor::storeContact(const Distributions& distributions, std::size_t k,
+void Distributor::writeContact(const Distributions& distributions, std::size_t k,
                                const Mask& answered) const {
   const Contact& contact = contacts_[k];
   const Standing& standing = standing_[k];
@@ -690,7 +621,7 @@ void Distributor::storeContact(const Distributions& distributions, std::size_t k
   const Lanes* f = standing.force;
   const Matrix& R = standing.rotation;
   const Mask written = answered && standing.is_active > 0.;
-  const Mask unloaded = f[2] < carrier_.minimal_vertical_force;
+  const Mask unloaded = !(f[2] >= carrier_.minimal_vertical_force && f[2] > 0.);
   const Lanes inverse = 1. / f[2];
   const bool is_surface = contact.size == 6;
 

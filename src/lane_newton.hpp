@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <vector>
+
+#include "lane_math.hpp"
+#include "lanes.hpp"
+
+namespace dynacom::lanes {
+
+// Force and moment.
+struct Wrench {
+  Lanes at[6];
+
+  Lanes& operator[](int i) { return at[i]; }
+  const Lanes& operator[](int i) const { return at[i]; }
+};
+
+inline Lanes dot(const Wrench& a, const Wrench& b) {
+  Lanes sum = a[0] * b[0];
+  for (int i = 1; i < 6; ++i) sum += a[i] * b[i];
+  return sum;
+}
+inline Lanes norm(const Wrench& a) { return stdx::sqrt(dot(a, a)); }
+// sum += s a
+inline void add(const Lanes& s, const Wrench& a, Wrench& sum) {
+  for (int i = 0; i < 6; ++i) sum[i] += s * a[i];
+}
+
+// A contact's forces in units of their cost, x = W λ, within a box that grows with the normal
+// force: |xᵢ| ≤ βᵢ x_z for all components but x_z itself, and x_z ≥ 0.
+struct Cone {
+  static constexpr int kNormal = 2;
+
+  int size = 0;           // 3 or 6 components
+  bool is_there = false;  // in any frame
+  double betas[6] = {};
+  Wrench e[6];  // D NE W⁻¹ over its unit, by columns; zero where the contact is not there
+
+  // Whether the contact bears a load, 1 or 0, and at which of its bounds a component is, 1 or −1,
+  // or 0 at neither: that is what decides how forces respond to a pull. Without a load, bounds are
+  // 0.
+  Lanes loaded, bounds[6];
+  Lanes inverse_stiffness;  // 1 / ‖edge‖², of the direction in which x_z takes bounds along
+  Lanes former_loaded, former_bounds[6];
+  Lanes pull[6], force[6];  // eᵀ ν, and x
+
+  // 1 where a component responds on its own.
+  Lanes isFree(int i) const { return loaded - bounds[i] * bounds[i]; }
+  Lanes edge(int i) const { return i == kNormal ? loaded : bounds[i] * betas[i]; }
+};
+
+// The wrench distribution of WrenchDistribution, as its DualNewton solves it, for as many problems
+// as there are lanes:
+//
+//     minimise ½ ‖W λ‖² + ½ ‖r‖² / ε   subject to   e x + r = w,   x in the cones
+//
+// by Newton's method on the dual, of which the gradient e x(ν) + ε ν − w is piecewise linear in the
+// six multipliers ν = r / ε of the wrench. What is found with ε serves to know the state of the
+// contacts, and no more: the forces follow from the state by linear equations without ε, and are an
+// answer only where they prove themselves.
+class DualNewton {
+ public:
+  explicit DualNewton(const std::vector<Contact>& contacts);
+
+  // Contacts, of which is_there and e are to be set before solve().
+  std::vector<Cone>& cones() { return cones_; }
+
+  // Finds forces.
+  // @param target  D w over its unit
+  // @param spread  how far wrench weights are apart, the largest over the least
+  // @param slack   ε, as a part of the mean compliance
+  // @param wanted  where there is a problem
+  // @returns where there is an answer
+  Mask solve(const Wrench& target, double spread, const double (&slacks)[2], const Mask& wanted);
+
+  // Of the answer: whether all of the target is given, and what is.
+  const Mask& isReached() const { return is_reached_; }
+  const Wrench& achieved() const { return achieved_; }
+
+  // The next solve() begins as the first did, not where the last one ended.
+  void forget() { is_warm_ = Mask(false); }
+
+ private:
+  void begin();
+  Mask search(const Mask& wanted);
+  Mask evaluate();
+  void keepStates();
+  void assembleCompliance();
+  Mask findRange();
+  Mask finish(double spread);
+  void correct(const Wrench& change);
+  Mask provesItself() const;
+  Mask provesItself(const Cone& cone, const Lanes (&terms)[6], const Lanes& costs) const;
+
+  std::vector<Cone> cones_;
+  Wrench target_, multipliers_, achieved_;
+  Wrench missing_;  // of the closest wrench
+  Mask is_warm_ = Mask(false), is_reached_;
+  Lanes slacks_[2];
+  Lanes compliance_[6][6];  // the lower half
+  Wrench range_[6];
+  std::vector<Wrench> directions_;
+};
+
+}  // namespace dynacom::lanes
