@@ -27,7 +27,7 @@ constexpr double kIndependent = 1e-5;
 constexpr double kDependent = 1e-11;
 // The distance from the closest wrench: more than the first, times how far wrench weights are
 // apart, it has digits enough, less than the second, it is rounding.
-constexpr double kFar = 1e-4;
+constexpr double kFar = 1e-6;
 constexpr double kReached = 1e-13;
 // What an answer may lack, and how often it is corrected.
 constexpr double kMissing = 1e-12;
@@ -73,22 +73,24 @@ inline void withSize(int size, Function function) {
 // Newton's method comes from the left, and lets go of one bound at least with each step.
 template <int kSize>
 inline void followPull(Cone& cone) {
-  Lanes sizes[kSize], normal = 0., stiffness = 1.;
+  Lanes sizes[kSize], resisting = 0., stiffness = 1.;  // x_z is their ratio
   for (int i = 0; i < kSize; ++i) sizes[i] = stdx::abs(cone.pull[i]);
   for (int step = 0; step < kSize; ++step) {
-    Lanes resisting = cone.pull[kNormal];
-    stiffness = 1.;
+    Lanes next_resisting = cone.pull[kNormal], next_stiffness = 1.;
     for (int i = 0; i < kSize; ++i) {
       if (i == kNormal) continue;
-      const Lanes held = select(sizes[i] > cone.betas[i] * normal, cone.betas[i], 0.);
-      resisting += held * sizes[i];
-      stiffness += held * cone.betas[i];
+      const double beta = cone.betas[i];
+      const Mask held = sizes[i] * stiffness > beta * resisting;
+      stdx::where(held, next_resisting) = next_resisting + beta * sizes[i];
+      stdx::where(held, next_stiffness) = next_stiffness + beta * beta;
     }
-    normal = stdx::max(Lanes(0.), resisting / stiffness);
+    resisting = stdx::max(Lanes(0.), next_resisting);
+    stiffness = next_stiffness;
   }
+  cone.inverse_stiffness = 1. / stiffness;
+  const Lanes normal = resisting * cone.inverse_stiffness;
   const Mask loaded = normal > 0.;
   cone.loaded = select(loaded, 1., 0.);
-  cone.inverse_stiffness = 1. / stiffness;
   for (int i = 0; i < kSize; ++i) {
     const Lanes& pull = cone.pull[i];
     const Lanes most = cone.betas[i] * normal;
@@ -100,6 +102,15 @@ inline void followPull(Cone& cone) {
   }
   cone.force[kNormal] = normal;
   cone.bounds[kNormal] = cone.loaded;
+}
+
+// How forces respond to a pull, as long as the state stays.
+template <int kSize>
+inline void respond(const Cone& cone, const Lanes* pull, Lanes* force) {
+  Lanes along = 0.;
+  for (int i = 0; i < kSize; ++i) along += cone.edge(i) * pull[i];
+  along *= cone.inverse_stiffness;
+  for (int i = 0; i < kSize; ++i) force[i] = cone.isFree(i) * pull[i] + along * cone.edge(i);
 }
 
 template <int kSize>
@@ -133,42 +144,60 @@ DualNewton::DualNewton(const std::vector<Contact>& contacts) : cones_(contacts.s
   directions_.reserve(6 * contacts.size());
 }
 
-// Enters the state in which no component is at its bound, but where the last search ended in one
-// that led to an answer.
+// Enters the state in which all contacts bear a load and no component is at its bound, from which
+// the first step leads to the closed form for forces without inequalities; with multipliers of
+// zero.
 void DualNewton::begin() {
+  setZero(multipliers_);
   for (Cone& cone : cones_) {
     if (!cone.is_there) continue;
-    for (int i = 0; i < cone.size; ++i)
-      stdx::where(!is_warm_, cone.bounds[i]) = i == kNormal || cone.betas[i] == 0. ? 1. : 0.;
-    stdx::where(!is_warm_, cone.loaded) = 1.;
-    stdx::where(!is_warm_, cone.inverse_stiffness) = 1.;
+    cone.loaded = cone.inverse_stiffness = 1.;
+    for (int i = 0; i < cone.size; ++i) {
+      cone.bounds[i] = i == kNormal || cone.betas[i] == 0. ? 1. : 0.;
+      cone.pull[i] = 0.;
+    }
   }
 }
 
-void DualNewton::keepStates() {
+// Begins a step that changes the multipliers.
+void DualNewton::startStep(const Wrench& change) {
   for (Cone& cone : cones_) {
     if (!cone.is_there) continue;
-    cone.former_loaded = cone.loaded;
-    for (int i = 0; i < cone.size; ++i) cone.former_bounds[i] = cone.bounds[i];
+    withSize(cone.size, [&](auto size) { findPull<size>(cone, change, cone.pull_change); });
+    cone.start_loaded = cone.loaded;
+    for (int i = 0; i < cone.size; ++i) {
+      cone.start_bounds[i] = cone.bounds[i];
+      cone.start_pull[i] = cone.pull[i];
+    }
   }
 }
 
-// The forces for the multipliers at hand, in the state that they want. Returns where that is
-// another than at the last keepStates().
-Mask DualNewton::evaluate() {
-  Mask changed(false);
-  setZero(achieved_);
+// The forces after a part of a step, in the state that they want then.
+DualNewton::Along DualNewton::followStep(const Lanes& length) {
+  Along along = {0., 0., Mask(false)};
   for (Cone& cone : cones_) {
     if (!cone.is_there) continue;
     withSize(cone.size, [&](auto size) {
-      findPull<size>(cone, multipliers_, cone.pull);
+      for (int i = 0; i < size; ++i)
+        cone.pull[i] = cone.start_pull[i] + length * cone.pull_change[i];
       followPull<size>(cone);
-      addWrench<size>(cone, achieved_);
-      changed = changed || cone.loaded != cone.former_loaded;
-      for (int i = 0; i < size; ++i) changed = changed || cone.bounds[i] != cone.former_bounds[i];
+      Lanes change[size];
+      respond<size>(cone, cone.pull_change, change);
+      along.changed = along.changed || cone.loaded != cone.start_loaded;
+      for (int i = 0; i < size; ++i) {
+        along.slope += cone.force[i] * cone.pull_change[i];
+        along.curvature += change[i] * cone.pull_change[i];
+        along.changed = along.changed || cone.bounds[i] != cone.start_bounds[i];
+      }
     });
   }
-  return changed;
+  return along;
+}
+
+void DualNewton::sumUp() {
+  setZero(achieved_);
+  for (const Cone& cone : cones_)
+    if (cone.is_there) withSize(cone.size, [&](auto size) { addWrench<size>(cone, achieved_); });
 }
 
 // How the wrench rises with its multipliers, as long as the state stays.
@@ -191,80 +220,87 @@ void DualNewton::assembleCompliance() {
   }
 }
 
-// Newton's method with ε, until the state stays. Returns where it does.
-Mask DualNewton::search(const Mask& wanted) {
-  Mask searching = wanted, found(false), is_fresh = wanted;
-  Lanes slack = slacks_[0];
-  setZero(multipliers_);
-  setZero(achieved_);
-  const auto findGradient = [&] {
-    Wrench gradient;
-    for (int i = 0; i < 6; ++i) gradient[i] = achieved_[i] + slack * multipliers_[i] - target_[i];
-    return gradient;
-  };
-  Wrench gradient = findGradient();
-  for (int step = 0; step < kMaximalSteps && stdx::any_of(searching); ++step) {
-    assembleCompliance();
-    Factors factors;
-    for (int j = 0; j < 6; ++j)
-      for (int i = j; i < 6; ++i) factors.m[i][j] = compliance_[i][j];
-    for (int i = 0; i < 6; ++i) factors.m[i][i] += slack;
-    factors.compute();
-    Wrench change;
-    for (int i = 0; i < 6; ++i) change[i] = select(searching, -gradient[i], 0.);
-    factors.solve(change.at);
-    const Lanes slope = dot(gradient, change);
-    const Mask is_down = slope < 0.;
-    searching = searching && is_down;
+// What Newton's method with ε changes at the multipliers at hand, for the dual's gradient there.
+Wrench DualNewton::findStep(const Wrench& gradient, const Lanes& slack) {
+  assembleCompliance();
+  Factors factors;
+  for (int j = 0; j < 6; ++j)
+    for (int i = j; i < 6; ++i) factors.m[i][j] = compliance_[i][j];
+  for (int i = 0; i < 6; ++i) factors.m[i][i] += slack;
+  factors.compute();
+  Wrench change;
+  for (int i = 0; i < 6; ++i) change[i] = -gradient[i];
+  factors.solve(change.at);
+  return change;
+}
 
-    // The slope along the step rises from negative on. The full step is taken unless the slope is
-    // positive there; else one is sought where it has nearly vanished, or at least the state is
-    // another.
-    const Wrench start = multipliers_;
-    keepStates();
-    Lanes length = 1., lower = 0., upper = 1., lower_slope = slope, upper_slope = 0.;
-    Mask cutting = searching, settled(false);
-    for (int cut = 0; stdx::any_of(cutting); ++cut) {
-      if (cut == kMaximalCuts) {
-        searching = searching && !cutting;
-        break;
-      }
-      for (int i = 0; i < 6; ++i) multipliers_[i] = start[i] + length * change[i];
-      const Mask changed = evaluate();
-      gradient = findGradient();
-      const Lanes end_slope = dot(gradient, change);
-      const Mask descends = end_slope < 0.;
-      Mask enough = stdx::abs(end_slope) <= -kFlat * slope;
-      if (cut == 0) {
-        settled = searching && !changed;
-        enough = enough || settled || descends || is_fresh;
-      } else if (cut >= kEasyCuts) {
-        enough = enough || (descends && changed);
-      }
-      cutting = cutting && !enough;
-      const Mask lies_low = cutting && descends, lies_high = cutting && !descends;
-      stdx::where(lies_low, lower) = length;
-      stdx::where(lies_low, lower_slope) = end_slope;
-      stdx::where(lies_high, upper) = length;
-      stdx::where(lies_high, upper_slope) = end_slope;
-      // By turns where a straight line between both would vanish, and in the middle.
-      const Lanes next = cut % 2 == 0
-                             ? lower + (upper - lower) * lower_slope / (lower_slope - upper_slope)
-                             : select(upper > kFarApart * lower && lower > 0.,
-                                      stdx::sqrt(lower * upper), 0.5 * (lower + upper));
-      stdx::where(cutting, length) = next;
+// Takes a step, or a part of it: the slope along it rises from negative on, and the full step is
+// taken unless the slope is positive there; else one is sought where it has nearly vanished, or at
+// least the state is another. Returns where the full step leaves the state as it is; where none is
+// found, nobody searches any more.
+Mask DualNewton::takeStep(const Wrench& change, const Wrench& gradient, const Lanes& slack,
+                          const Mask& is_free, Mask& searching) {
+  const Lanes slope = dot(gradient, change);
+  searching = searching && slope < 0.;
+  startStep(change);
+  const Lanes slope_of_rest = slack * dot(multipliers_, change) - dot(target_, change);
+  const Lanes curvature_of_rest = slack * dot(change, change);
+  Lanes length = 1., lower = 0., upper = 1.;
+  Mask cutting = searching, stays(false);
+  for (int cut = 0; stdx::any_of(cutting); ++cut) {
+    if (cut == kMaximalCuts) {
+      searching = searching && !cutting;
+      break;
     }
-    // Down to the last ε, it begins anew from the state.
-    is_fresh = settled && slack > slacks_[1];
-    found = found || (settled && !is_fresh);
-    searching = searching && !(settled && !is_fresh);
-    if (stdx::any_of(is_fresh)) {
-      stdx::where(is_fresh, slack) = slacks_[1];
-      for (int i = 0; i < 6; ++i) {
-        stdx::where(is_fresh, multipliers_[i]) = 0.;
-        stdx::where(is_fresh, gradient[i]) = -target_[i];
-      }
+    Along along = followStep(length);
+    along.slope += slope_of_rest + length * curvature_of_rest;
+    along.curvature += curvature_of_rest;
+    const Mask descends = along.slope < 0.;
+    Mask enough = stdx::abs(along.slope) <= -kFlat * slope;
+    if (cut == 0) {
+      stays = searching && !along.changed;
+      enough = enough || stays || descends || is_free;
+    } else if (cut >= kEasyCuts) {
+      enough = enough || (descends && along.changed);
     }
+    cutting = cutting && !enough;
+    stdx::where(cutting && descends, lower) = length;
+    stdx::where(cutting && !descends, upper) = length;
+    // Where the slope would vanish if the state stayed, unless that is known to be too far.
+    const Lanes next = length - along.slope / along.curvature;
+    const Lanes middle = select(upper > kFarApart * lower && lower > 0., stdx::sqrt(lower * upper),
+                                0.5 * (lower + upper));
+    stdx::where(cutting, length) =
+        select(next > lower && next < upper && Mask(cut % 3 != 2), next, middle);
+  }
+  for (int i = 0; i < 6; ++i) multipliers_[i] += length * change[i];
+  return stays;
+}
+
+// Newton's method with ε, until the state stays; first with a larger one. Returns where it does.
+Mask DualNewton::search() {
+  Mask searching(true), found(false), is_fresh(true);
+  Lanes slack = slacks_[0];
+  begin();
+  Wrench gradient;
+  for (int i = 0; i < 6; ++i) gradient[i] = -target_[i];
+  for (int step = 0; step < kMaximalSteps && stdx::any_of(searching); ++step) {
+    Wrench change = findStep(gradient, slack);
+    for (Lanes& number : change.at) stdx::where(!searching, number) = 0.;
+    const Mask stays = takeStep(change, gradient, slack, is_fresh, searching);
+    // With the last ε, it begins anew from the state.
+    is_fresh = stays && slack > slacks_[1];
+    found = found || (stays && !is_fresh);
+    searching = searching && !found;
+    sumUp();
+    stdx::where(is_fresh, slack) = slacks_[1];
+    for (int i = 0; i < 6; ++i) {
+      stdx::where(is_fresh, multipliers_[i]) = 0.;
+      gradient[i] = achieved_[i] + slack * multipliers_[i] - target_[i];
+      stdx::where(is_fresh, gradient[i]) = -target_[i];
+    }
+    for (Cone& cone : cones_)
+      for (Lanes& number : cone.pull) stdx::where(is_fresh, number) = 0.;
   }
   return found;
 }
@@ -273,21 +309,19 @@ Mask DualNewton::search(const Mask& wanted) {
 // change, which is more accurate than what they respond to the sum.
 void DualNewton::correct(const Wrench& change) {
   for (int i = 0; i < 6; ++i) multipliers_[i] += change[i];
-  setZero(achieved_);
   for (Cone& cone : cones_) {
     if (!cone.is_there) continue;
     withSize(cone.size, [&](auto size) {
-      Lanes pull[size], along = 0.;
+      Lanes pull[size], force[size];
       findPull<size>(cone, change, pull);
-      for (int i = 0; i < size; ++i) along += cone.edge(i) * pull[i];
-      along *= cone.inverse_stiffness;
+      respond<size>(cone, pull, force);
       for (int i = 0; i < size; ++i) {
         cone.pull[i] += pull[i];
-        cone.force[i] += cone.isFree(i) * pull[i] + along * cone.edge(i);
+        cone.force[i] += force[i];
       }
-      addWrench<size>(cone, achieved_);
     });
   }
+  sumUp();
 }
 
 // An orthonormal basis of the wrenches that the state can give, whatever it costs: one direction
@@ -435,17 +469,14 @@ Mask DualNewton::provesItself() const {
   return proven;
 }
 
-Mask DualNewton::solve(const Wrench& target, double spread, const double (&slacks)[2],
-                       const Mask& wanted) {
+Mask DualNewton::solve(const Wrench& target, double spread, const double (&slacks)[2]) {
   target_ = target;
   Lanes mean_compliance = 0.;
   for (const Cone& cone : cones_)
     if (cone.is_there)
       for (int i = 0; i < cone.size; ++i) mean_compliance += dot(cone.e[i], cone.e[i]);
   for (int k = 0; k < 2; ++k) slacks_[k] = slacks[k] / 6. * mean_compliance;
-  begin();
-  const Mask found = search(wanted);
-  is_warm_ = Mask(false);
+  const Mask found = search();
   return found && finish(spread);
 }
 

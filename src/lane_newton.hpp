@@ -42,8 +42,9 @@ struct Cone {
   // 0.
   Lanes loaded, bounds[6];
   Lanes inverse_stiffness;  // 1 / ‖edge‖², of the direction in which x_z takes bounds along
-  Lanes former_loaded, former_bounds[6];
   Lanes pull[6], force[6];  // eᵀ ν, and x
+  // At the start of a step, and what that changes.
+  Lanes start_loaded, start_bounds[6], start_pull[6], pull_change[6];
 
   // 1 where a component responds on its own.
   Lanes isFree(int i) const { return loaded - bounds[i] * bounds[i]; }
@@ -69,24 +70,31 @@ class DualNewton {
   // Finds forces.
   // @param target  D w over its unit
   // @param spread  how far wrench weights are apart, the largest over the least
-  // @param slack   ε, as a part of the mean compliance
-  // @param wanted  where there is a problem
+  // @param slacks  ε at first and at last, as parts of the mean compliance
   // @returns where there is an answer
-  Mask solve(const Wrench& target, double spread, const double (&slacks)[2], const Mask& wanted);
+  Mask solve(const Wrench& target, double spread, const double (&slacks)[2]);
 
   // Of the answer: whether all of the target is given, and what is.
   const Mask& isReached() const { return is_reached_; }
   const Wrench& achieved() const { return achieved_; }
 
-  // The next solve() begins as the first did, not where the last one ended.
-  void forget() { is_warm_ = Mask(false); }
-
  private:
+  // Along a step: the dual's slope and how that rises, and where the state is another than at its
+  // start.
+  struct Along {
+    Lanes slope, curvature;
+    Mask changed;
+  };
+
   void begin();
-  Mask search(const Mask& wanted);
-  Mask evaluate();
-  void keepStates();
+  Mask search();
+  Wrench findStep(const Wrench& gradient, const Lanes& slack);
+  Mask takeStep(const Wrench& change, const Wrench& gradient, const Lanes& slack,
+                const Mask& is_free, Mask& searching);
+  void startStep(const Wrench& change);
+  Along followStep(const Lanes& length);
   void assembleCompliance();
+  void sumUp();
   Mask findRange();
   Mask finish(double spread);
   void correct(const Wrench& change);
@@ -96,7 +104,7 @@ class DualNewton {
   std::vector<Cone> cones_;
   Wrench target_, multipliers_, achieved_;
   Wrench missing_;  // of the closest wrench
-  Mask is_warm_ = Mask(false), is_reached_;
+  Mask is_reached_;
   Lanes slacks_[2];
   Lanes compliance_[6][6];  // the lower half
   Wrench range_[6];

@@ -20,7 +20,7 @@ constexpr double kFullRank = 1e-6;
 // What part of the wrench an answer may lack.
 constexpr double kMissing = 1e-12;
 // ε of Newton's method: less, if the answer that it leads to is none.
-constexpr double kSlacks[][2] = {{1e-3, 1e-6}, {1e-4, 1e-8}};
+constexpr double kSlacks[][2] = {{1e-5, 1e-8}, {1e-4, 1e-9}};
 
 // How a joint's frame moves, in the world's axes: velocity and acceleration are those of its origin
 // as a point.
@@ -325,7 +325,6 @@ class Distributor : Block {
     for (const double(&slacks)[2] : kSlacks) {
       candidates_.swap(left_);
       left_.clear();
-      newton_.forget();
       for (std::size_t first = 0; first < candidates_.size(); first += kLanes) {
         take(candidates_, static_cast<std::ptrdiff_t>(first));
         takeProblem(distributions);
@@ -549,7 +548,7 @@ Mask Distributor::findBoundForces(const double (&slacks)[2]) {
     }
   }
 
-  const Mask answered = newton_.solve(target, spread_, slacks, Mask(true));
+  const Mask answered = newton_.solve(target, spread_, slacks);
   const Lanes unit = scale / overall_weight;
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
     Standing& standing = standing_[k];

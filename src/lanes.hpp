@@ -100,8 +100,8 @@ struct ContactRows {
 
 /// What is known of a frame.
 enum class Answer : char {
-  None,     // there is none, whatever was written
-  Solved,   // see DistributionStatus
+  None,    // there is none, whatever was written
+  Solved,  // see DistributionStatus
   Relaxed,
 };
 
