@@ -9,6 +9,8 @@ namespace {
 // All of these are for a problem whose weighted wrench has unit size, as in dual_newton.cpp.
 
 constexpr int kNormal = Cone::kNormal;
+// ε of each attempt, as parts of the mean compliance, at first and at last.
+constexpr double kSlacks[DualNewton::kAttempts][2] = {{1e-5, 1e-8}, {1e-4, 1e-9}};
 // How many steps a search may take.
 constexpr int kMaximalSteps = 20;
 // Along a step, what part of the slope at its start is as good as none.
@@ -29,8 +31,10 @@ constexpr double kDependent = 1e-11;
 // apart, it has digits enough, less than the second, it is rounding.
 constexpr double kFar = 1e-6;
 constexpr double kReached = 1e-13;
-// What an answer may lack, and how often it is corrected.
+// What an answer may lack, and how often it is corrected, beginning with none; out of reach more
+// often, because there what is missing is to be accurate, too.
 constexpr double kMissing = 1e-12;
+constexpr int kFreeCorrections = 2;
 constexpr int kCorrections = 3;
 // By how much the signs of an answer may be wrong, beside the terms that make them up.
 constexpr double kRounding = 1e-12;
@@ -220,18 +224,15 @@ void DualNewton::assembleCompliance() {
   }
 }
 
-// What Newton's method with ε changes at the multipliers at hand, for the dual's gradient there.
-Wrench DualNewton::findStep(const Wrench& gradient, const Lanes& slack) {
-  assembleCompliance();
+// Factors of the compliance with ε.
+Factors DualNewton::factorise(const Lanes& slack) const {
   Factors factors;
-  for (int j = 0; j < 6; ++j)
+  for (int j = 0; j < 6; ++j) {
     for (int i = j; i < 6; ++i) factors.m[i][j] = compliance_[i][j];
-  for (int i = 0; i < 6; ++i) factors.m[i][i] += slack;
+    factors.m[j][j] += slack;
+  }
   factors.compute();
-  Wrench change;
-  for (int i = 0; i < 6; ++i) change[i] = -gradient[i];
-  factors.solve(change.at);
-  return change;
+  return factors;
 }
 
 // Takes a step, or a part of it: the slope along it rises from negative on, and the full step is
@@ -278,22 +279,24 @@ Mask DualNewton::takeStep(const Wrench& change, const Wrench& gradient, const La
 }
 
 // Newton's method with ε, until the state stays; first with a larger one. Returns where it does.
-Mask DualNewton::search() {
+Mask DualNewton::search(const Lanes& first_slack, const Lanes& last_slack) {
   Mask searching(true), found(false), is_fresh(true);
-  Lanes slack = slacks_[0];
+  Lanes slack = first_slack;
   begin();
   Wrench gradient;
   for (int i = 0; i < 6; ++i) gradient[i] = -target_[i];
   for (int step = 0; step < kMaximalSteps && stdx::any_of(searching); ++step) {
-    Wrench change = findStep(gradient, slack);
-    for (Lanes& number : change.at) stdx::where(!searching, number) = 0.;
+    assembleCompliance();
+    Wrench change;
+    for (int i = 0; i < 6; ++i) change[i] = select(searching, -gradient[i], 0.);
+    factorise(slack).solve(change.at);
     const Mask stays = takeStep(change, gradient, slack, is_fresh, searching);
     // With the last ε, it begins anew from the state.
-    is_fresh = stays && slack > slacks_[1];
+    is_fresh = stays && slack > last_slack;
     found = found || (stays && !is_fresh);
     searching = searching && !found;
     sumUp();
-    stdx::where(is_fresh, slack) = slacks_[1];
+    stdx::where(is_fresh, slack) = last_slack;
     for (int i = 0; i < 6; ++i) {
       stdx::where(is_fresh, multipliers_[i]) = 0.;
       gradient[i] = achieved_[i] + slack * multipliers_[i] - target_[i];
@@ -362,19 +365,35 @@ Mask DualNewton::findRange() {
   return is_certain;
 }
 
+// The forces in the state at hand that give a wrench within its range, by factors of the compliance
+// in the range's coordinates. Returns where they do.
+Mask DualNewton::reach(const Wrench& wrench, const Factors& factors, int corrections) {
+  setZero(multipliers_);
+  setZero(achieved_);
+  for (Cone& cone : cones_)
+    for (int i = 0; i < 6; ++i) cone.pull[i] = cone.force[i] = 0.;
+  for (int correction = 0; correction < corrections; ++correction) {
+    const Wrench lacking = difference(wrench, achieved_);
+    Lanes coordinates[6];
+    for (int j = 0; j < 6; ++j) coordinates[j] = dot(range_[j], lacking);
+    factors.solve(coordinates);
+    Wrench change;
+    setZero(change);
+    for (int j = 0; j < 6; ++j) add(coordinates[j], range_[j], change);
+    correct(change);
+  }
+  return norm(difference(wrench, achieved_)) <= kMissing;
+}
+
 // From the state to the answer, without ε. Returns where there is one.
 Mask DualNewton::finish(double spread) {
-  Mask answered = findRange();
   // The closest wrench is the projection on what the directions span.
   missing_ = target_;
   for (int twice = 0; twice < 2; ++twice)
     for (const Wrench& direction : range_) add(-dot(direction, missing_), direction, missing_);
-  Lanes distance = norm(missing_);
+  const Lanes distance = norm(missing_);
   is_reached_ = distance <= kReached;
-  stdx::where(is_reached_, distance) = 0.;
   for (Lanes& number : missing_.at) stdx::where(is_reached_, number) = 0.;
-  answered = answered && (is_reached_ || distance >= kFar * spread);
-  const Wrench closest = difference(target_, missing_);
 
   // In the coordinates of the range: beyond its rank, all zeros, the diagonal is 1.
   Factors factors;
@@ -389,22 +408,8 @@ Mask DualNewton::finish(double spread) {
     factors.m[j][j] += select(dot(range_[j], range_[j]) > 0., 0., 1.);
   }
   factors.compute();
-  setZero(multipliers_);
-  setZero(achieved_);
-  for (Cone& cone : cones_)
-    for (int i = 0; i < 6; ++i) cone.pull[i] = cone.force[i] = 0.;
-  for (int correction = 0; correction < kCorrections; ++correction) {
-    const Wrench lacking = difference(closest, achieved_);
-    Lanes coordinates[6];
-    for (int j = 0; j < 6; ++j) coordinates[j] = dot(range_[j], lacking);
-    factors.solve(coordinates);
-    Wrench change;
-    setZero(change);
-    for (int j = 0; j < 6; ++j) add(coordinates[j], range_[j], change);
-    correct(change);
-  }
-  answered = answered && norm(difference(closest, achieved_)) <= kMissing;
-  return answered && provesItself();
+  const Mask is_given = reach(difference(target_, missing_), factors, kCorrections);
+  return is_given && (is_reached_ || distance >= kFar * spread) && provesItself();
 }
 
 // Where multipliers of both stages have the signs that they must have, and forces are in their
@@ -450,6 +455,20 @@ Mask DualNewton::provesItself(const Cone& cone, const Lanes (&terms)[6], const L
   return proven && ((loaded && pushes) || (!loaded && stays_unloaded));
 }
 
+// Where forces are inside of their cones, so that nothing else needs a proof.
+Mask DualNewton::isInside() const {
+  Mask inside(true);
+  for (const Cone& cone : cones_) {
+    if (!cone.is_there) continue;
+    const Lanes& normal = cone.force[kNormal];
+    Mask own = normal > 0.;
+    for (int i = 0; i < cone.size; ++i)
+      if (i != kNormal) own = own && stdx::abs(cone.force[i]) <= cone.betas[i] * normal;
+    inside = inside && (own || !cone.isPresent());
+  }
+  return inside;
+}
+
 Mask DualNewton::provesItself() const {
   Lanes costs = kRounding;
   for (const Cone& cone : cones_)
@@ -469,15 +488,29 @@ Mask DualNewton::provesItself() const {
   return proven;
 }
 
-Mask DualNewton::solve(const Wrench& target, double spread, const double (&slacks)[2]) {
+Mask DualNewton::solveFreely(const Wrench& target) {
+  target_ = target;
+  is_reached_ = Mask(true);
+  begin();
+  assembleCompliance();
+  Factors factors = factorise(0.);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) range_[i][j] = i == j ? 1. : 0.;
+  const Mask gives_all = factors.least_pivot > kFullRank * factors.largest_pivot;
+  const Mask is_given = reach(target, factors, kFreeCorrections);
+  return gives_all && is_given && isInside();
+}
+
+Mask DualNewton::solve(const Wrench& target, double spread, int attempt) {
   target_ = target;
   Lanes mean_compliance = 0.;
   for (const Cone& cone : cones_)
     if (cone.is_there)
-      for (int i = 0; i < cone.size; ++i) mean_compliance += dot(cone.e[i], cone.e[i]);
-  for (int k = 0; k < 2; ++k) slacks_[k] = slacks[k] / 6. * mean_compliance;
-  const Mask found = search();
-  return found && finish(spread);
+      for (int i = 0; i < cone.size; ++i) mean_compliance += dot(cone.e[i], cone.e[i]) / 6.;
+  const Mask found =
+      search(kSlacks[attempt][0] * mean_compliance, kSlacks[attempt][1] * mean_compliance);
+  const Mask is_certain = findRange();
+  return found && is_certain && finish(spread);
 }
 
 }  // namespace dynacom::lanes

@@ -46,6 +46,8 @@ struct Cone {
   // At the start of a step, and what that changes.
   Lanes start_loaded, start_bounds[6], start_pull[6], pull_change[6];
 
+  // Where it is there.
+  Mask isPresent() const { return dot(e[kNormal], e[kNormal]) > 0.; }
   // 1 where a component responds on its own.
   Lanes isFree(int i) const { return loaded - bounds[i] * bounds[i]; }
   Lanes edge(int i) const { return i == kNormal ? loaded : bounds[i] * betas[i]; }
@@ -62,17 +64,22 @@ struct Cone {
 // answer only where they prove themselves.
 class DualNewton {
  public:
+  static constexpr int kAttempts = 2;
+
   explicit DualNewton(const std::vector<Contact>& contacts);
 
   // Contacts, of which is_there and e are to be set before solve().
   std::vector<Cone>& cones() { return cones_; }
 
-  // Finds forces.
+  // Finds the forces that give a wrench if no inequality holds them back.
   // @param target  D w over its unit
-  // @param spread  how far wrench weights are apart, the largest over the least
-  // @param slacks  ε at first and at last, as parts of the mean compliance
   // @returns where there is an answer
-  Mask solve(const Wrench& target, double spread, const double (&slacks)[2]);
+  Mask solveFreely(const Wrench& target);
+
+  // The same if any do, and for the closest wrench.
+  // @param spread   how far wrench weights are apart, the largest over the least
+  // @param attempt  the first, 0, finds nearly all
+  Mask solve(const Wrench& target, double spread, int attempt);
 
   // Of the answer: whether all of the target is given, and what is.
   const Mask& isReached() const { return is_reached_; }
@@ -87,8 +94,8 @@ class DualNewton {
   };
 
   void begin();
-  Mask search();
-  Wrench findStep(const Wrench& gradient, const Lanes& slack);
+  Mask search(const Lanes& first_slack, const Lanes& last_slack);
+  Factors factorise(const Lanes& slack) const;
   Mask takeStep(const Wrench& change, const Wrench& gradient, const Lanes& slack,
                 const Mask& is_free, Mask& searching);
   void startStep(const Wrench& change);
@@ -96,7 +103,9 @@ class DualNewton {
   void assembleCompliance();
   void sumUp();
   Mask findRange();
+  Mask reach(const Wrench& wrench, const Factors& factors, int corrections);
   Mask finish(double spread);
+  Mask isInside() const;
   void correct(const Wrench& change);
   Mask provesItself() const;
   Mask provesItself(const Cone& cone, const Lanes (&terms)[6], const Lanes& costs) const;
@@ -105,7 +114,6 @@ class DualNewton {
   Wrench target_, multipliers_, achieved_;
   Wrench missing_;  // of the closest wrench
   Mask is_reached_;
-  Lanes slacks_[2];
   Lanes compliance_[6][6];  // the lower half
   Wrench range_[6];
   std::vector<Wrench> directions_;

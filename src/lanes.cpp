@@ -15,12 +15,6 @@ namespace {
 constexpr double kNormalized = 1e-12;
 // From which angle on sine and cosine of stdx overflow [rad].
 constexpr double kLargestAngle = 1e9;
-// What part of the largest pivot the least must be, so that the contacts give all wrenches.
-constexpr double kFullRank = 1e-6;
-// What part of the wrench an answer may lack.
-constexpr double kMissing = 1e-12;
-// ε of Newton's method: less, if the answer that it leads to is none.
-constexpr double kSlacks[][2] = {{1e-5, 1e-8}, {1e-4, 1e-9}};
 
 // How a joint's frame moves, in the world's axes: velocity and acceleration are those of its origin
 // as a point.
@@ -310,6 +304,9 @@ class Distributor : Block {
     const double* D = carrier.wrench_weights;
     spread_ = *std::max_element(D, D + 6) / *std::min_element(D, D + 6);
     minimal_scale_ = carrier.minimal_scale * *std::max_element(D, D + 3);
+    for (const Contact& contact : contacts_)
+      largest_weight_ = std::max(
+          largest_weight_, *std::max_element(contact.weights, contact.weights + contact.size));
   }
 
   // First the forces that no inequality holds back. Frames without an answer are gathered, so that
@@ -320,16 +317,15 @@ class Distributor : Block {
       take(first, distributions.count);
       takeProblem(distributions);
       if (carrier_.flat_horizontal_ground) findCentreOfPressure(distributions);
-      write(distributions, is_carried_ && findFreeForces(), Mask(true));
+      write(distributions, newton_.solveFreely(target_));
     }
-    for (const double(&slacks)[2] : kSlacks) {
+    for (int attempt = 0; attempt < DualNewton::kAttempts; ++attempt) {
       candidates_.swap(left_);
       left_.clear();
       for (std::size_t first = 0; first < candidates_.size(); first += kLanes) {
         take(candidates_, static_cast<std::ptrdiff_t>(first));
         takeProblem(distributions);
-        const Mask answered = findBoundForces(slacks);
-        write(distributions, answered, newton_.isReached());
+        write(distributions, newton_.solve(target_, spread_, attempt));
       }
     }
   }
@@ -342,16 +338,16 @@ class Distributor : Block {
     Matrix rotation;  // of its surface
     Vector lever;     // from the CoM to the surface's origin
     Vector moments[3];
+    Lanes inverse_weights[6];  // from forces of Newton's method to its own: W⁻¹, times a unit
     Lanes force[6];
-    Lanes ease;  // of its forces: √ρ, over the largest weight of all
   };
 
   void takeProblem(const Distributions& distributions);
   void stand(const ContactRows& rows, Standing& standing) const;
+  void scaleProblem();
   void findCentreOfPressure(const Distributions& distributions) const;
-  Mask findFreeForces();
-  Mask findBoundForces(const double (&slacks)[2]);
-  void write(const Distributions& distributions, const Mask& answered, const Mask& reached);
+  void takeForces();
+  void write(const Distributions& distributions, const Mask& answered);
   void writeMeanPressure(const Distributions& distributions, const Mask& answered) const;
   void writeContact(const Distributions& distributions, std::size_t k, const Mask& answered) const;
 
@@ -359,26 +355,57 @@ class Distributor : Block {
   const std::vector<Contact> contacts_;
   double spread_;                   // the largest wrench weight over the least
   double minimal_scale_;            // of weighted wrenches
+  double largest_weight_ = 0.;      // of all contacts
   std::vector<Standing> standing_;  // by contact
   DualNewton newton_;
   std::vector<std::ptrdiff_t> left_, candidates_;  // frames without an answer, now and before
 
   // Of the frames at hand.
   Vector com_, force_, torque_;
-  Lanes wrench_[6], achieved_[6];
-  Mask is_carried_;  // by any contact
+  Wrench wrench_, achieved_;
+  Mask is_carried_;       // by any contact
+  Wrench target_, unit_;  // D w over its unit, and that
 };
 
 void Distributor::takeProblem(const Distributions& distributions) {
   com_ = loadVector(distributions.com);
   force_ = loadVector(distributions.force);
   torque_ = loadVector(distributions.torque);
-  const Lanes wrench[6] = {force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z};
-  for (int i = 0; i < 6; ++i) wrench_[i] = wrench[i];
+  wrench_ = {{force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z}};
   is_carried_ = Mask(false);
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
     stand(distributions.contacts[k], standing_[k]);
     if (standing_[k].takes_part) is_carried_ = is_carried_ || standing_[k].is_active > 0.;
+  }
+  scaleProblem();
+}
+
+// Gives Newton's method the problem over its units, as WrenchDistribution has them.
+void Distributor::scaleProblem() {
+  const double* D = carrier_.wrench_weights;
+  for (int i = 0; i < 6; ++i) target_[i] = D[i] * wrench_[i];
+  const Lanes size = norm(target_);
+  const Lanes scale = stdx::max(size, Lanes(minimal_scale_)), inverse_scale = 1. / scale;
+  for (int i = 0; i < 6; ++i) {
+    target_[i] *= inverse_scale;
+    unit_[i] = scale / D[i];
+  }
+  const Lanes inverse_overall_weight = norm(wrench_) / size;
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    Standing& standing = standing_[k];
+    Cone& cone = newton_.cones()[k];
+    cone.is_there = standing.takes_part;
+    if (!standing.takes_part) continue;
+    const Vector axes[3] = {standing.rotation.x, standing.rotation.y, standing.rotation.z};
+    const Lanes ease = stdx::sqrt(standing.is_active) * inverse_overall_weight;
+    for (int i = 0; i < cone.size; ++i) {
+      const Lanes inverse_weight = ease * (largest_weight_ / contacts_[k].weights[i]);
+      standing.inverse_weights[i] = scale * inverse_weight;
+      const Vector force = i < 3 ? axes[i] : zero();
+      const Vector moment = i < 3 ? standing.moments[i] : axes[i - 3];
+      cone.e[i] = {{force.x, force.y, force.z, moment.x, moment.y, moment.z}};
+      for (int j = 0; j < 6; ++j) cone.e[i][j] *= D[j] * inverse_weight;
+    }
   }
 }
 
@@ -415,156 +442,21 @@ void Distributor::findCentreOfPressure(const Distributions& distributions) const
   store(distributions.cop, {x, y});
 }
 
-// The cheapest forces that give the wrench, whatever inequalities say: the multipliers ν solve
-// NE W⁻² NEᵀ ν = w, and λ = W⁻² NEᵀ ν. Says where all inequalities hold.
-Mask Distributor::findFreeForces() {
-  const double* D = carrier_.wrench_weights;
-  Factors factors;
-  Lanes compliance[6][6];
-  for (auto& row : compliance)
-    for (Lanes& number : row) number = 0.;
-  // Components whose bound is zero have no force.
-  const auto isFree = [](const Contact& contact, int i) { return i == 2 || contact.betas[i] > 0.; };
-  const auto add = [&](const Lanes& scale, const Lanes* column, int first) {
-    for (int j = first; j < 6; ++j) {
-      const Lanes scaled = scale * column[j];
-      for (int i = j; i < 6; ++i) compliance[i][j] += scaled * column[i];
-    }
-  };
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    const Contact& contact = contacts_[k];
-    const Standing& standing = standing_[k];
-    if (!standing.takes_part) continue;
-    const Vector* axes[3] = {&standing.rotation.x, &standing.rotation.y, &standing.rotation.z};
-    for (int i = 0; i < contact.size; ++i) {
-      if (!isFree(contact, i)) continue;
-      const Vector& axis = *axes[i % 3];
-      const Lanes scale = standing.is_active / (contact.weights[i] * contact.weights[i]);
-      if (i < 3) {
-        const Vector& moment = standing.moments[i];
-        const Lanes column[6] = {axis.x, axis.y, axis.z, moment.x, moment.y, moment.z};
-        add(scale, column, 0);
-      } else {
-        const Lanes column[6] = {0., 0., 0., axis.x, axis.y, axis.z};
-        add(scale, column, 3);
-      }
-    }
-  }
-  for (int j = 0; j < 6; ++j)
-    for (int i = j; i < 6; ++i) factors.m[i][j] = compliance[i][j] *= D[i] * D[j];
-  factors.compute();
-  Mask answered = factors.least_pivot > kFullRank * factors.largest_pivot;
-
-  Lanes multipliers[6], missing[6], size = 0.;
-  for (int i = 0; i < 6; ++i) {
-    missing[i] = D[i] * wrench_[i];
-    multipliers[i] = missing[i];
-    size += missing[i] * missing[i];
-  }
-  factors.solve(multipliers);
-  for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j)
-      missing[i] -= compliance[std::max(i, j)][std::min(i, j)] * multipliers[j];
-  factors.solve(missing);
-  for (int i = 0; i < 6; ++i) multipliers[i] = D[i] * (multipliers[i] + missing[i]);
-
-  const Vector of_force = {multipliers[0], multipliers[1], multipliers[2]};
-  const Vector of_moment = {multipliers[3], multipliers[4], multipliers[5]};
-  Vector force = zero(), moment = zero();
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    const Contact& contact = contacts_[k];
-    Standing& standing = standing_[k];
-    if (!standing.takes_part) continue;
-    const Matrix& R = standing.rotation;
-    const Vector pull = transposed(R, of_force), turn = transposed(R, of_moment);
-    const Lanes pulls[6] = {pull.x + dot(standing.moments[0], of_moment),
-                            pull.y + dot(standing.moments[1], of_moment),
-                            pull.z + dot(standing.moments[2], of_moment),
-                            turn.x,
-                            turn.y,
-                            turn.z};
-    for (int i = 0; i < 6; ++i) {
-      const bool free = i < contact.size && isFree(contact, i);
-      const double weight = contact.weights[i];
-      standing.force[i] = free ? standing.is_active * pulls[i] / (weight * weight) : Lanes(0.);
-    }
-    const Lanes* f = standing.force;
-    const Vector own = R * Vector{f[0], f[1], f[2]};
-    force += own;
-    moment += cross(standing.lever, own) + R * Vector{f[3], f[4], f[5]};
-    Mask inside = f[2] > 0.;
-    for (int i = 0; i < contact.size; ++i)
-      if (i != 2) inside = inside && stdx::abs(f[i]) <= contact.betas[i] * f[2];
-    answered = answered && (inside || standing.is_active == 0.);
-  }
-  const Lanes achieved[6] = {force.x, force.y, force.z, moment.x, moment.y, moment.z};
-  Lanes distance = 0.;
-  for (int i = 0; i < 6; ++i) {
-    achieved_[i] = achieved[i];
-    const Lanes lacking = D[i] * (wrench_[i] - achieved[i]);
-    distance += lacking * lacking;
-  }
-  return answered && distance <= kMissing * kMissing * size;
-}
-
-// The cheapest forces within their cones that give the wrench, or the closest one to it.
-Mask Distributor::findBoundForces(const double (&slacks)[2]) {
-  const double* D = carrier_.wrench_weights;
-  Wrench target;
-  Lanes size = 0., weighted_size = 0., largest_weight = 0.;
-  for (int i = 0; i < 6; ++i) {
-    target[i] = D[i] * wrench_[i];
-    size += wrench_[i] * wrench_[i];
-    weighted_size += target[i] * target[i];
-  }
-  weighted_size = stdx::sqrt(weighted_size);
-  const Lanes scale = stdx::max(weighted_size, Lanes(minimal_scale_));
-  const Lanes overall_weight = weighted_size / stdx::sqrt(size);
-  for (int i = 0; i < 6; ++i) target[i] /= scale;
-
-  // By readiness ρ, W is 1 / √ρ times the contact's weights, over the largest of all.
-  std::vector<Cone>& cones = newton_.cones();
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    const Standing& standing = standing_[k];
-    if (!standing.takes_part) continue;
-    const double* weights = contacts_[k].weights;
-    const Lanes weight =
-        *std::max_element(weights, weights + contacts_[k].size) / stdx::sqrt(standing.is_active);
-    stdx::where(standing.is_active > 0. && weight > largest_weight, largest_weight) = weight;
-  }
+// Takes over what Newton's method has found.
+void Distributor::takeForces() {
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
     Standing& standing = standing_[k];
-    Cone& cone = cones[k];
-    cone.is_there = standing.takes_part;
-    if (!standing.takes_part) continue;
-    const Vector* axes[3] = {&standing.rotation.x, &standing.rotation.y, &standing.rotation.z};
-    standing.ease = largest_weight * stdx::sqrt(standing.is_active);
-    for (int i = 0; i < cone.size; ++i) {
-      const Vector& force = i < 3 ? *axes[i] : zero();
-      const Vector& moment = i < 3 ? standing.moments[i] : *axes[i - 3];
-      const Lanes factor = standing.ease / (contacts_[k].weights[i] * overall_weight);
-      cone.e[i] = {{D[0] * factor * force.x, D[1] * factor * force.y, D[2] * factor * force.z,
-                    D[3] * factor * moment.x, D[4] * factor * moment.y, D[5] * factor * moment.z}};
-    }
-  }
-
-  const Mask answered = newton_.solve(target, spread_, slacks);
-  const Lanes unit = scale / overall_weight;
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    Standing& standing = standing_[k];
-    if (!standing.takes_part) continue;
+    const Cone& cone = newton_.cones()[k];
     for (int i = 0; i < 6; ++i)
-      standing.force[i] = i < contacts_[k].size
-                              ? unit * standing.ease / contacts_[k].weights[i] * cones[k].force[i]
-                              : Lanes(0.);
+      standing.force[i] = i < cone.size ? standing.inverse_weights[i] * cone.force[i] : Lanes(0.);
   }
-  for (int i = 0; i < 6; ++i) achieved_[i] = scale / D[i] * newton_.achieved()[i];
-  return answered;
+  for (int i = 0; i < 6; ++i) achieved_[i] = unit_[i] * newton_.achieved()[i];
 }
 
-// Writes the forces at hand where they are an answer.
-void Distributor::write(const Distributions& distributions, const Mask& answered,
-                        const Mask& reached) {
+// Writes what was found, where it is an answer, and says of other frames that they are left.
+void Distributor::write(const Distributions& distributions, const Mask& answered) {
+  takeForces();
+  const Mask& reached = newton_.isReached();
   for (int lane = 0; lane < count_; ++lane) {
     const std::ptrdiff_t frame = frameOf(lane);
     const Answer answer = reached[lane] ? Answer::Solved : Answer::Relaxed;
