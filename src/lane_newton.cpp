@@ -20,15 +20,15 @@ constexpr int kMaximalCuts = 30;
 constexpr int kEasyCuts = 3;
 // For which ratio of two lengths their middle is the geometric one.
 constexpr double kFarApart = 4.;
-// What part of the largest pivot the least must be, so that nothing needs to be asked about the
-// rank.
+// What part of the largest pivot the least must be, so that the contacts give all wrenches.
 constexpr double kFullRank = 1e-6;
 // Of a direction of the wrenches that the contacts give, what remains outside of the others: more
 // than the first, it is one of its own, less than the second, it is rounding.
 constexpr double kIndependent = 1e-5;
 constexpr double kDependent = 1e-11;
 // The distance from the closest wrench: more than the first, times how far wrench weights are
-// apart, it has digits enough, less than the second, it is rounding.
+// apart, it has digits enough, less than the second, it is rounding. Over this distance, rounding
+// of a unit wrench is 1e-10, two digits below what is taken for a multiplier.
 constexpr double kFar = 1e-6;
 constexpr double kReached = 1e-13;
 // What an answer may lack, and how often it is corrected, beginning with none; out of reach more
@@ -237,10 +237,11 @@ Factors DualNewton::factorise(const Lanes& slack) const {
 
 // Takes a step, or a part of it: the slope along it rises from negative on, and the full step is
 // taken unless the slope is positive there; else one is sought where it has nearly vanished, or at
-// least the state is another. Returns where the full step leaves the state as it is; where none is
-// found, nobody searches any more.
+// least the state is another. From a state that is not the one of the multipliers at hand, where
+// slopes say nothing, it is the full step. Returns where that leaves the state as it is; where no
+// length is found, nobody searches any more.
 Mask DualNewton::takeStep(const Wrench& change, const Wrench& gradient, const Lanes& slack,
-                          const Mask& is_free, Mask& searching) {
+                          const Mask& is_full, Mask& searching) {
   const Lanes slope = dot(gradient, change);
   searching = searching && slope < 0.;
   startStep(change);
@@ -260,7 +261,7 @@ Mask DualNewton::takeStep(const Wrench& change, const Wrench& gradient, const La
     Mask enough = stdx::abs(along.slope) <= -kFlat * slope;
     if (cut == 0) {
       stays = searching && !along.changed;
-      enough = enough || stays || descends || is_free;
+      enough = enough || stays || descends || is_full;
     } else if (cut >= kEasyCuts) {
       enough = enough || (descends && along.changed);
     }
@@ -278,12 +279,17 @@ Mask DualNewton::takeStep(const Wrench& change, const Wrench& gradient, const La
   return stays;
 }
 
-// Newton's method with ε, until the state stays; first with a larger one. Returns where it does.
+// Newton's method with ε, until the state stays. Returns where it does.
+//
+// Out of reach, multipliers are as large as 1/ε, and from those that belong to a wrong state it
+// takes many small steps. With an ε that is not that small there are few, and its state is nearly
+// that of the last ε, which begins anew from there: with multipliers of zero, so that the first
+// step leads to those that belong to this state.
 Mask DualNewton::search(const Lanes& first_slack, const Lanes& last_slack) {
   Mask searching(true), found(false), is_fresh(true);
   Lanes slack = first_slack;
   begin();
-  Wrench gradient;
+  Wrench gradient;  // of the dual
   for (int i = 0; i < 6; ++i) gradient[i] = -target_[i];
   for (int step = 0; step < kMaximalSteps && stdx::any_of(searching); ++step) {
     assembleCompliance();
@@ -291,7 +297,6 @@ Mask DualNewton::search(const Lanes& first_slack, const Lanes& last_slack) {
     for (int i = 0; i < 6; ++i) change[i] = select(searching, -gradient[i], 0.);
     factorise(slack).solve(change.at);
     const Mask stays = takeStep(change, gradient, slack, is_fresh, searching);
-    // With the last ε, it begins anew from the state.
     is_fresh = stays && slack > last_slack;
     found = found || (stays && !is_fresh);
     searching = searching && !found;
@@ -303,7 +308,8 @@ Mask DualNewton::search(const Lanes& first_slack, const Lanes& last_slack) {
       stdx::where(is_fresh, gradient[i]) = -target_[i];
     }
     for (Cone& cone : cones_)
-      for (Lanes& number : cone.pull) stdx::where(is_fresh, number) = 0.;
+      if (cone.is_there)
+        for (Lanes& number : cone.pull) stdx::where(is_fresh, number) = 0.;
   }
   return found;
 }
@@ -413,7 +419,10 @@ Mask DualNewton::finish(double spread) {
 }
 
 // Where multipliers of both stages have the signs that they must have, and forces are in their
-// cones; of a contact whose forces and pulls are sums of these terms, without signs.
+// cones: the conditions of Karush, Kuhn and Tucker of one contact, as DualNewton::provesItself() of
+// dual_newton.cpp asks for them.
+// @param terms  what forces and pulls are sums of, without signs
+// @param costs  the largest of all forces
 Mask DualNewton::provesItself(const Cone& cone, const Lanes (&terms)[6], const Lanes& costs) const {
   const Lanes distance = norm(missing_);
   const auto sizeOf = [&](int i) { return distance * norm(cone.e[i]); };
@@ -493,7 +502,7 @@ Mask DualNewton::solveFreely(const Wrench& target) {
   is_reached_ = Mask(true);
   begin();
   assembleCompliance();
-  Factors factors = factorise(0.);
+  const Factors factors = factorise(0.);
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j) range_[i][j] = i == j ? 1. : 0.;
   const Mask gives_all = factors.least_pivot > kFullRank * factors.largest_pivot;

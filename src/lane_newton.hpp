@@ -53,15 +53,20 @@ struct Cone {
   Lanes edge(int i) const { return i == kNormal ? loaded : bounds[i] * betas[i]; }
 };
 
-// The wrench distribution of WrenchDistribution, as its DualNewton solves it, for as many problems
-// as there are lanes:
+// Both stages of a wrench distribution, as internal::DualNewton solves them, for as many problems
+// as there are lanes. To know the state of the contacts,
 //
-//     minimise ½ ‖W λ‖² + ½ ‖r‖² / ε   subject to   e x + r = w,   x in the cones
+//     minimise ½ ‖x‖² + ½ ‖r‖² / ε   subject to   e x + r = w,   x in the cones
 //
-// by Newton's method on the dual, of which the gradient e x(ν) + ε ν − w is piecewise linear in the
-// six multipliers ν = r / ε of the wrench. What is found with ε serves to know the state of the
-// contacts, and no more: the forces follow from the state by linear equations without ε, and are an
+// by Newton's method on the dual. Its gradient e x(ν) + ε ν − w is piecewise linear in the six
+// multipliers ν = r / ε of the wrench; within a state, it rises by e P eᵀ + ε, the compliance and
+// ε, with P what x responds to a pull eᵀ ν. Each step is one of semismooth Newton methods (Qi and
+// Sun, Mathematical Programming 58, 1993), with a length for which the dual falls. The forces
+// follow from the state by linear equations without ε: those of least cost among those that give
+// the closest wrench, which is the target's projection on what the state can give. They are an
 // answer only where they prove themselves.
+//
+// Lanes share nothing but the time that they take: what one says does not depend on the others.
 class DualNewton {
  public:
   static constexpr int kAttempts = 2;

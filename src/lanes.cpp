@@ -447,6 +447,7 @@ void Distributor::takeForces() {
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
     Standing& standing = standing_[k];
     const Cone& cone = newton_.cones()[k];
+    if (!cone.is_there) continue;
     for (int i = 0; i < 6; ++i)
       standing.force[i] = i < cone.size ? standing.inverse_weights[i] * cone.force[i] : Lanes(0.);
   }

@@ -4,10 +4,10 @@
 #include <cstddef>
 
 // What crosses between the library and its lanes: the per-frame mathematics of analyzeMotion(), in
-// its two steps, for several frames at once, one in each lane of a SIMD register. lanes.cpp is
-// compiled once for each width that registers may have, each time with flags of its own, into a
-// shared object of its own: hence plain arrays, and nothing of Eigen, Pinocchio or the standard
-// library.
+// its two steps, for several frames at once, one in each lane of a SIMD register. lanes.cpp and
+// lane_newton.cpp are compiled once for each width that registers may have, each time with flags of
+// their own, into a shared object of its own: hence plain arrays, and nothing of Eigen, Pinocchio
+// or the standard library.
 //
 // Placements are twelve numbers: the rotation, column by column, and the translation.
 
