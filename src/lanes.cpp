@@ -338,7 +338,7 @@ class Distributor : Block {
     Matrix rotation;  // of its surface
     Vector lever;     // from the CoM to the surface's origin
     Vector moments[3];
-    Lanes inverse_weights[6];  // from forces of Newton's method to its own: W⁻¹, times a unit
+    Lanes inverse_weights[6];  // W⁻¹ times the unit of force
     Lanes force[6];
   };
 
