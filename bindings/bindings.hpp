@@ -33,6 +33,8 @@ void exposeContactInference();
 void exposeRecordedMotion();
 void exposeMotionAnalysis();
 void exposeMotionVerdict();
+void exposeMissingSupport();
+void exposeTerrain();
 void exposeMotionStatistics();
 void exposeMotionExamination();
 

@@ -43,6 +43,8 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeCollisionPoints();
   exposeContactInference();
   exposeMotionVerdict();
+  exposeMissingSupport();
+  exposeTerrain();
   exposeMotionStatistics();
   exposeMotionExamination();
 }

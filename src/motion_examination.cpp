@@ -97,6 +97,13 @@ Eigen::MatrixXd findRecordedConfidence(const std::vector<std::string>& names,
   return confidence;
 }
 
+// In which share of the frames each contact is otherwise in one schedule than in the other.
+Eigen::VectorXd findDisagreement(const ContactSchedule::Matrix& one,
+                                 const ContactSchedule::Matrix& other) {
+  const auto differ = (one.array() != other.array()).cast<double>();
+  return differ.rowwise().sum() / double(one.cols());
+}
+
 // Frames whose accelerations a filter has smeared: those around the beginning and the end of a
 // flight, where the force jumps, by half a period of the cut-off.
 void addSmeared(const ContactSchedule& schedule, const Eigen::VectorXd& time, double cutoff,
@@ -461,10 +468,16 @@ class MotionExaminer::Workspace::Pipeline {
       found.schedule.confidence = findRecordedConfidence(found.schedule.names, *recorded_.schedule);
     found.bodies = internal::gatherBodies(*split_, schedule);
     found.parts = split_->parts;
+    if (found.inferred)
+      found.disagreement = findDisagreement(found.schedule.active, found.inferred->active);
     found.ground = findGround(swept.contacts, found.parts, swept.parts, found.inference.ground);
+    found.terrain = findTerrain(found.parts, found.inference, found.schedule, found.ground,
+                                found.derived.motion.time, settings_.detection.ground_height);
     found.analysis = internal::gatherParts(workspace_.robot, *split_, swept.contacts, swept.parts,
                                            std::move(swept.analysis));
     dropIdle(found.bodies, found.analysis.bodies);
+    found.missing_support =
+        findMissingSupport(workspace_.robot, found.analysis, found.verdict, settings_.verdict);
     found.contacts = std::move(swept.contacts);
     found.part_motions = std::move(swept.parts);
     found.statistics =

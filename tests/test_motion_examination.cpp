@@ -142,6 +142,21 @@ BOOST_AUTO_TEST_CASE(an_examination_is_its_steps) {
       BOOST_TEST(close(found.verdict.findings[k].measured, verdict.findings[k].measured, 1e-9));
     BOOST_TEST(close(found.statistics.residual_force_rms, statistics.residual_force_rms, 1e-9));
     BOOST_TEST(found.sensitivity.empty());
+    const Terrain terrain =
+        findTerrain(split.parts, inference, schedule, MatrixXd::Zero(2, motion.frames()),
+                    motion.time, settings.detection.ground_height);
+    BOOST_TEST(close(found.terrain.lowest, terrain.lowest));
+    BOOST_TEST(found.terrain.contacts[1].name == clips.robot.getKnownContacts()[1]);
+    BOOST_TEST(close(found.terrain.contacts[1].height, 0.));
+    BOOST_TEST(found.terrain.held.size() == terrain.held.size());
+    const auto missing = findMissingSupport(clips.robot, analysis, verdict, settings.verdict);
+    BOOST_TEST_REQUIRE(missing.has_value());
+    BOOST_TEST_REQUIRE(found.missing_support.has_value());
+    BOOST_TEST(found.missing_support->frames == missing->frames);
+    BOOST_TEST(close(found.missing_support->force, missing->force, 1e-9));
+    BOOST_TEST(found.missing_support->force <=
+               std::max(found.verdict[MotionFault::ResidualForce].worst,
+                        found.verdict[MotionFault::FlightWithSupportNeeded].worst));
     // Something is out of reach, and something is not.
     BOOST_TEST(statistics.share(DistributionStatus::Solved) > 0.1);
     BOOST_TEST(statistics.share(DistributionStatus::Relaxed) > 0.05);
@@ -161,9 +176,21 @@ BOOST_AUTO_TEST_CASE(what_is_recorded_says_how_sure_it_is) {
   BOOST_TEST((found.schedule.confidence.row(0).array() == 0.).all());
   BOOST_TEST((found.schedule.confidence.row(1).array() == 0.75).all());
   BOOST_TEST(!found.schedule.active.row(0).any());
+  // The other one stands, too: what is given and what is found differ in it.
+  BOOST_TEST_REQUIRE(found.disagreement.size() == 2);
+  for (const Index k : {0, 1}) {
+    Index frames_that_differ = 0;
+    for (Index frame = 0; frame < frames; ++frame)
+      frames_that_differ += found.schedule.active(k, frame) != found.inferred->active(k, frame);
+    BOOST_TEST(found.disagreement[k] == double(frames_that_differ) / double(frames));
+  }
+  BOOST_TEST(found.disagreement[0] > 0.5);
+  BOOST_TEST(found.disagreement[1] < 0.1);
   recorded.schedule->confidence.resize(0, 0);
   found = examineMotion(clips.robot, recorded);
   BOOST_TEST((found.schedule.confidence.row(1).array() == 1.).all());
+  recorded.schedule.reset();
+  BOOST_TEST(examineMotion(clips.robot, recorded).disagreement.size() == 0);
 }
 
 BOOST_AUTO_TEST_CASE(other_cutoffs_are_tried_where_there_was_a_filter) {
