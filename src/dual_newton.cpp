@@ -629,8 +629,10 @@ bool DualNewton::provesItself() {
       const double beta = block.betas[i], size = std::abs(p[i]);
       const double scale = distance * block.e.col(i).norm();
       const double own_rounding = kRounding * block.terms[i];
-      if (size > kFree * scale && size < kHeld * scale) return false;
-      const bool held = size > kFree * scale;
+      // Of what bears no load, such a pull only says on which side it is bound.
+      const bool decides = block.state.loaded && beta > 0.;
+      if (decides && size > kFree * scale && size < kHeld * scale) return false;
+      const bool held = size > kFree * scale && size >= kHeld * scale;
       signed char& bound = block.state.bounds[static_cast<std::size_t>(i)];
       if (!block.state.loaded || beta == 0.) {
         bound = (held ? p[i] : g[i]) < 0. ? -1 : 1;

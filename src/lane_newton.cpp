@@ -440,9 +440,12 @@ Mask DualNewton::provesItself(const Cone& cone, const Lanes (&terms)[6], const L
     const Lanes own_rounding = kRounding * terms[i];
     const Lanes& force = cone.force[i];
     const Lanes& pull = cone.pull[i];
-    const Mask is_held = stdx::abs(pull_of_distance) > kFree * own_size;
-    proven = proven && (!is_held || stdx::abs(pull_of_distance) >= kHeld * own_size);
-    const Mask is_bound = loaded && cone.bounds[i] != 0. && Mask(beta > 0.);
+    const Mask is_one = stdx::abs(pull_of_distance) > kFree * own_size;
+    const Mask is_held = is_one && stdx::abs(pull_of_distance) >= kHeld * own_size;
+    // Of what bears no load, such a pull only says on which side it is bound.
+    const Mask decides = loaded && Mask(beta > 0.);
+    proven = proven && (!decides || is_held || !is_one);
+    const Mask is_bound = decides && cone.bounds[i] != 0.;
     const Mask is_free = loaded && cone.bounds[i] == 0.;
     proven = proven && (!is_free || (!is_held && stdx::abs(force) <= beta * cone.force[kNormal] +
                                                                          kRounding * costs));

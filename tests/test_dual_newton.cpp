@@ -36,6 +36,19 @@ MatrixXd inequalities(const ContactBase& contact) {
   return A;
 }
 
+/// A contact where it is, as a distribution knows it.
+DistributionResult::Contact describe(const ContactBase& contact) {
+  DistributionResult::Contact described;
+  described.A = inequalities(contact);
+  described.weights = contact.reg_A();
+  described.NE = contact.ne_A();
+  described.force.setZero(contact.cols());
+  described.active.setConstant(described.A.rows(), false);
+  described.multipliers.setZero(described.A.rows());
+  described.relaxation_multipliers.setZero(described.A.rows());
+  return described;
+}
+
 /// Feet of a robot of 1 m, on ground that is flat but for 0.2 rad.
 std::vector<DistributionResult::Contact> feet(Random& random) {
   std::vector<DistributionResult::Contact> contacts;
@@ -47,14 +60,7 @@ std::vector<DistributionResult::Contact> feet(Random& random) {
         Vector3d::Zero(),
         pinocchio::SE3(Eigen::AngleAxisd(tilt.norm(), tilt.normalized()).toRotationMatrix(),
                        place + 0.3 * random.vector(3, 1.)));
-    contacts.emplace_back();
-    contacts.back().A = inequalities(*contact);
-    contacts.back().weights = contact->reg_A();
-    contacts.back().NE = contact->ne_A();
-    contacts.back().force.setZero(contact->cols());
-    contacts.back().active.setConstant(contacts.back().A.rows(), false);
-    contacts.back().multipliers.setZero(contacts.back().A.rows());
-    contacts.back().relaxation_multipliers.setZero(contacts.back().A.rows());
+    contacts.push_back(describe(*contact));
   }
   return contacts;
 }
@@ -254,6 +260,31 @@ BOOST_AUTO_TEST_CASE(the_answer_is_that_of_the_other_solver) {
   BOOST_TEST(relaxed > trials / 4);
   BOOST_TEST(left < trials / 50);
   BOOST_TEST_MESSAGE(solved << " solved, " << relaxed << " relaxed, " << left << " left");
+}
+
+BOOST_AUTO_TEST_CASE(a_foot_that_is_all_but_level_tips_over_its_side) {
+  // Its other side is pulled sideways by less than counts, and by more than rounding.
+  DistributionResult mine;
+  for (const double x : {-0.1, 0.1})
+    for (const double y : {-0.04, 0.04}) {
+      const auto point = makePoint("foot");
+      const double z = y > 0. ? -0.7 : -0.7 + 1e-10;
+      point->updateNewtonEuler(Vector3d::Zero(),
+                               pinocchio::SE3(Eigen::Matrix3d::Identity(), Vector3d(x, y, z)));
+      mine.contacts.push_back(describe(*point));
+    }
+  DistributionResult other = mine;
+  const Vector6 weights = Vector6::Ones();
+  const Vector6 wrench = (Vector6() << 0.02, 0.03, 1., 0.08, 0.02, 0.01).finished();
+  DualNewton newton = newtonOf(mine.contacts);
+  BOOST_TEST(
+      (newton.solve(mine.contacts, wrench, weights, true, kEnough) == DistributionStatus::Relaxed));
+  newton.writeAnswer(mine, 1., 1.);
+  TwoStageSolver<long double> solver;
+  solver.setProblem(other.contacts, weights);
+  BOOST_TEST((solver.solve(wrench.cast<long double>(), kEnough) == DistributionStatus::Relaxed));
+  solver.writeAnswer(other, 1., 1.);
+  BOOST_TEST(close(mine.forces(), other.forces(), 1e-8));
 }
 
 BOOST_AUTO_TEST_CASE(no_wrench_wants_no_forces_whatever_was_before) {

@@ -290,6 +290,22 @@ BOOST_AUTO_TEST_CASE(contacts_of_each_kind_are_shared_in_lanes) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(a_foot_that_is_all_but_level_tips_over_its_side_in_lanes) {
+  // Its other side is pulled sideways by less than counts, and by more than rounding.
+  std::vector<ProblemContact> corners = makeCorners();
+  corners.resize(4);
+  for (const std::size_t k : {1, 3}) corners[k].lever.z() += 1e-10;
+  Problem problem = makeProblem(corners);
+  problem.wrench << 7., 10., 343., 28., 7., 3.;
+  Random random(305);
+  std::vector<Vector6> wrenches;
+  for (int k = 0; k < 101; ++k) wrenches.push_back(problem.wrench + 3. * Vector6(random.vector(6)));
+  Tally tally;
+  check(Stand(problem, wrenches, random, true), tally);
+  BOOST_TEST(tally.solved == 0);
+  BOOST_TEST(tally.in_lanes > 0.9 * tally.bound);
+}
+
 BOOST_AUTO_TEST_CASE(a_frame_does_not_depend_on_those_beside_it) {
   // Bit for bit, whatever they need.
   Random random(304);
