@@ -110,8 +110,9 @@ Terrain findTerrain(const std::vector<PartRobot::Part>& parts, const ContactInfe
       if (!isActive(inference.schedule, stance.part, stance)) continue;
       stood_on.push_back(stance.height);
       ContactTerrain& contact = terrain.contacts[part.contact];
-      addOther(contact.levels, stance.height, kSameLevel);
-      if (!stance.slope.isZero(0.))
+      if (stance.slope.isZero(0.))
+        addOther(contact.levels, stance.height, kSameLevel);
+      else
         addOther(contact.slopes, std::atan(stance.slope.norm()), kSameSlope);
       continue;
     }

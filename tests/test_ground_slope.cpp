@@ -231,27 +231,26 @@ BOOST_AUTO_TEST_CASE(a_roof_has_two_slopes_and_a_ridge_one_for_each_foot) {
     BOOST_TEST(close(sides[k], Vector2d(0.1, ridge[k].contact == 0 ? -0.2 : 0.2), 1e-9));
 }
 
-BOOST_AUTO_TEST_CASE(four_legs_find_a_ramp_by_where_they_step) {
-  for (const double degrees : {5., 12.}) {
-    const Ground ramp = makeRamp(degrees, 0.8, 2.3);
-    Footings footings;
-    for (int beat = 0; beat < 26; ++beat)
-      for (int leg = 0; leg < 4; ++leg) {
-        if ((leg == 0 || leg == 3) != (beat % 2 == 0)) continue;  // a trot
-        Eigen::Matrix3Xd point(3, 1);
-        point << 0.12 * beat + (leg < 2 ? 0.26 : -0.25), leg % 2 == 0 ? 0.15 : -0.15, 0.;
-        point(2, 0) = ramp(point(0, 0), point(1, 0));
-        footings.push_back({std::size_t(leg), point});
-      }
-    const auto slopes = findGroundSlopes(footings);
-    for (std::size_t k = 0; k < footings.size(); ++k) {
-      const double x = footings[k].points(0, 0);
-      // Points within centimetres of its ends are in both planes.
-      if (x > 0.85 && x < 2.25)
-        BOOST_TEST(
-            close(slopes[k], Vector2d(std::tan(degrees * std::acos(-1.) / 180.), 0.), 0.005));
-      else if (x < 0.75 || x > 2.35)
-        BOOST_TEST(slopes[k].isZero(0.));
-    }
-  }
+BOOST_AUTO_TEST_CASE(how_long_one_walks_changes_nothing) {
+  // Up and down between level ground, again and again.
+  const auto ground = [](double x, double) {
+    const double place = std::fmod(x, 5.);
+    return 0.14 * std::min(std::clamp(place - 0.85, 0., 1.5), std::clamp(4.1 - place, 0., 1.5));
+  };
+  const int steps = 20;  // a round
+  const auto once = findGroundSlopes(walk(ground, steps + 1));
+  const auto often = findGroundSlopes(walk(ground, 50 * steps + 1));
+  BOOST_TEST(std::count_if(once.begin(), once.end(),
+                           [](const Vector2d& slope) { return !slope.isZero(0.); }) == 12);
+  for (std::size_t k = 2; k < often.size(); ++k)
+    BOOST_TEST(close(often[k], once[(k - 1) % steps + 1], 1e-9));
+}
+
+BOOST_AUTO_TEST_CASE(points_beside_level_ground_are_on_no_slope) {
+  // A flight of stairs that is climbed on points, one on each tread.
+  Eigen::Matrix3Xd points(3, 24);
+  for (Index k = 0; k < 24; ++k)
+    points.col(k) << 0.25 * double(k), 0.1 * double(k % 2),
+        0.15 * std::clamp(double(k) - 6., 0., 9.);
+  BOOST_TEST(isLevel(asPoints(points)));
 }

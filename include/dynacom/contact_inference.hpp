@@ -19,8 +19,8 @@ struct Stance {
   /// Frames that belong to it: with those of the way from the stance before and to the next one, up
   /// to where the part is fastest.
   Eigen::Index begin, end;
-  /// The ground's gradient (∂z/∂x, ∂z/∂y) there; zero where it is level or not known, or where the
-  /// part is never active.
+  /// The ground's gradient (∂z/∂x, ∂z/∂y) there; zero where it is level, told by
+  /// DetectionSettings::ground_height or not known, or where the part is never active.
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
 };
 

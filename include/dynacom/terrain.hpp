@@ -12,8 +12,8 @@ namespace dynacom {
 
 /// Stances of a contact are on different levels if their heights differ by more than this [m].
 constexpr double kSameLevel = 0.05;
-/// And on different slopes if their inclinations do by more than this [rad].
-constexpr double kSameSlope = 0.002;
+/// And on different slopes if their inclinations do by more than this, a degree [rad].
+constexpr double kSameSlope = 0.01746;
 /// How long a contact is at rest at least to be held there [s].
 constexpr double kHeldDuration = 0.5;
 
@@ -22,10 +22,10 @@ struct ContactTerrain {
   std::string name;
   double height;  ///< its median over the frames in which the contact is active [m]; NaN where that
                   ///< is never, or the ground is not known
-  /// Heights of the stances on which it stands, increasing [m]: of the first, and of each that is
-  /// on another level than all before it, see kSameLevel.
+  /// Heights of the stances on which it stands and which are on no slope, increasing [m]: of the
+  /// first, and of each that is on another level than all before it, see kSameLevel.
   std::vector<double> levels;
-  /// Inclinations of those stances that are on a slope, increasing [rad]: of the first, and of each
+  /// Inclinations of the stances that are on a slope, increasing [rad]: of the first, and of each
   /// that is on another slope than all before it, see kSameSlope.
   std::vector<double> slopes;
 };

@@ -10,6 +10,8 @@ from dynacom.dynacom_pywrap import MotionExamination, Terrain
 
 # From which height on a ground is worth a question: most files have theirs at zero [m].
 _FAR_FROM_ZERO = 0.1
+# So many values are told one by one.
+_LISTED = 4
 # Schedules that differ in more of the frames than this are worth a word.
 _DISAGREEMENT = 0.02
 
@@ -44,9 +46,8 @@ def terrain_texts(options: AnalysisOptions, found: MotionExamination) -> Iterato
             + (" on a ground that moves so" if velocity.any() else "")
             + ": where the ground is, is not known."
         )
-    elif slope := _slope_text(found):
-        yield slope
     else:
+        yield from _slope_texts(found)
         yield from _level_texts(terrain, known)
     if not found.analysis.bodies:  # who lies or kneels has the feet where they are
         yield from _held_texts(options, terrain)
@@ -58,37 +59,43 @@ def _text(value: float, digits: int) -> str:
     return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
-def _slope_text(found: MotionExamination) -> str | None:
+def _list_text(texts: list[str]) -> str:
+    """Values in their order, or, where there are many, from which to which they are."""
+    if len(texts) > _LISTED:
+        return f"{texts[0]} to {texts[-1]}"
+    *first, last = texts
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _slope_texts(found: MotionExamination) -> Iterator[str]:
     """If some stances are on ground that is not level."""
     if (gradient := found.inference.slope).any():
         angle = np.degrees(np.arctan(np.linalg.norm(gradient)))
         towards = np.degrees(np.arctan2(gradient[1], gradient[0]))
-        return (
+        yield (
             f"The ground is a slope of {angle:.1f} degrees, which rises towards "
             f"{_text(towards, 0)} degrees from the world's x axis."
         )
-    slopes = {contact.name: contact.slopes for contact in found.terrain.contacts if contact.slopes}
-    if not slopes:
-        return None
-    texts = []
-    for name, angles in slopes.items():
-        *first, last = (f"{np.degrees(angle):.1f}" for angle in angles)
-        texts.append(f"{name} on {', '.join(first)}{' and ' if first else ''}{last} degrees")
-    return (
-        f"Slopes are stood on, by {'; by '.join(texts)}. Where else they stand, the ground is "
-        "taken for level."
-    )
+    elif slopes := {
+        contact.name: _list_text([f"{np.degrees(angle):.1f}" for angle in contact.slopes])
+        for contact in found.terrain.contacts
+        if contact.slopes
+    }:
+        texts = "; by ".join(f"{name} on {angles} degrees" for name, angles in slopes.items())
+        yield (
+            f"Slopes are stood on, by {texts}. Where else they stand, the ground is taken for "
+            "level."
+        )
 
 
 def _level_texts(terrain: Terrain, known: dict[str, float]) -> Iterator[str]:
-    steps = []
-    for contact in terrain.contacts:
-        if len(contact.levels) > 1:
-            *first, last = (_text(height, 2) for height in contact.levels)
-            steps.append(f"{contact.name} stands at {', '.join(first)} and {last} m")
-    if steps:
+    if steps := [
+        f"{contact.name} stands at {_list_text([_text(h, 2) for h in contact.levels])} m"
+        for contact in terrain.contacts
+        if len(contact.levels) > 1
+    ]:
         yield f"{'; '.join(steps)}: steps or stairs, or feet that float."
-    else:
+    elif not any(contact.slopes for contact in terrain.contacts):
         text = ", ".join(f"{name} {_text(height, 3)} m" for name, height in known.items())
         yield f"Height of the ground: {text}."
     if abs(terrain.lowest) > _FAR_FROM_ZERO:

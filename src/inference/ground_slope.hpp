@@ -14,12 +14,11 @@ struct Footing {
 
 /// The ground's gradient (∂z/∂x, ∂z/∂y) under each footing; zero where it is level or not known.
 ///
-/// Ground is made of levels and of planes that are not level. It is explained at the least cost:
-/// what footings are off it, and so much for each level and each plane (minimum description length,
-/// Rissanen 1978). Planes are tried through neighbours in time, and added as long as they pay, each
-/// the one that saves most. A sole that is tilted shows nothing by itself: a plane is a slope if
-/// the rise from footing to footing agrees, over half a metre.
-/// @param footings  in the order of time, no contact's number being large
+/// A sole that is tilted shows nothing by itself: a plane is a slope if the rise from footing to
+/// footing agrees. Either all footings lie in one plane; or soles that follow each other, of all
+/// contacts or of one, lie in one and are tilted as it is. Points alone show no slope beside level
+/// ground: who climbs stairs on points steps as on a plane.
+/// @param footings  in the order of time
 std::vector<Eigen::Vector2d> findGroundSlopes(const std::vector<Footing>& footings);
 
 }  // namespace dynacom::internal
