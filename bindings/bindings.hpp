@@ -119,6 +119,26 @@ bp::list toList(const std::vector<Element>& elements) {
   return list;
 }
 
+/// Reads a vector member as a list of its elements themselves, which keep their owner: for what is
+/// large, and Python cannot change.
+template <auto member>
+struct Elements;
+template <class Class, class Element, std::vector<Element> Class::*member>
+struct Elements<member> {
+  static bp::list get(const bp::object& self) {
+    const Class& owner = bp::extract<const Class&>(self);
+    const typename bp::reference_existing_object::apply<const Element&>::type refer;
+    bp::list list;
+    for (const Element& element : owner.*member) {
+      const bp::object reference{bp::handle<>(refer(element))};
+      if (!bp::objects::make_nurse_and_patient(reference.ptr(), self.ptr()))
+        bp::throw_error_already_set();
+      list.append(reference);
+    }
+    return list;
+  }
+};
+
 /// The elements of any iterable.
 template <class Element>
 std::vector<Element> toVectorOf(const bp::object& elements) {

@@ -105,7 +105,8 @@ std::string writePartRobot(const PartRobot& split) {
 std::string writeStance(const Stance& stance) {
   return internal::concat("Stance(part=", stance.part, ", first=", stance.first,
                           ", behind=", stance.behind, ", height=", stance.height,
-                          ", on_ground=", stance.on_ground ? "True" : "False", ", slope=(",
+                          ", on_ground=", stance.on_ground ? "True" : "False",
+                          ", begin=", stance.begin, ", end=", stance.end, ", slope=(",
                           stance.slope.x(), ", ", stance.slope.y(), "))");
 }
 

@@ -10,12 +10,6 @@ namespace {
 
 bp::list getStatus(const MotionAnalysis& analysis) { return toList(analysis.status); }
 
-bp::list getContacts(const MotionAnalysis& analysis) { return toList(analysis.contacts); }
-
-bp::list getParts(const MotionAnalysis& analysis) { return toList(analysis.parts); }
-
-bp::list getBodies(const MotionAnalysis& analysis) { return toList(analysis.bodies); }
-
 std::string writeBody(const MotionAnalysis::Body& body) {
   return internal::concat("MotionAnalysis.Body(link='", body.link, "', frames=", body.active.size(),
                           ", active_frames=", body.active.count(), ")");
@@ -116,10 +110,11 @@ void exposeMotionAnalysis() {
           .add_property("status", &getStatus, "T times a DistributionStatus")
           .add_property("residual", &Rows<&Analysis::residual>::get,
                         "Ground wrench minus what the contacts give, (T, 6)")
-          .add_property("contacts", &getContacts, "A MotionAnalysis.Contact for each contact")
-          .add_property("parts", &getParts,
+          .add_property("contacts", &Elements<&Analysis::contacts>::get,
+                        "A MotionAnalysis.Contact for each contact")
+          .add_property("parts", &Elements<&Analysis::parts>::get,
                         "The same for the contacts' parts, where these were gathered")
-          .add_property("bodies", &getBodies,
+          .add_property("bodies", &Elements<&Analysis::bodies>::get,
                         "A MotionAnalysis.Body for each link that touches something, besides")
           .def(PrintVisitor<Analysis>(&writeAnalysis))
           .def(CopyVisitor<Analysis>());

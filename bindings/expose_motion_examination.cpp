@@ -8,11 +8,7 @@ namespace {
 
 using Examination = MotionExamination;
 
-bp::list getContacts(const Examination& examination) { return toList(examination.contacts); }
-
 bp::list getParts(const Examination& examination) { return toList(examination.parts); }
-
-bp::list getPartMotions(const Examination& examination) { return toList(examination.part_motions); }
 
 bp::object getInferred(const Examination& examination) {
   return examination.inferred ? bp::object(*examination.inferred) : bp::object();
@@ -111,9 +107,10 @@ void exposeMotionExamination() {
       "MotionExamination", "All that was found of a recorded motion, see MotionExaminer.",
       bp::no_init)
       .def_readonly("derived", &Examination::derived, "The DerivedMotion")
-      .add_property("contacts", &getContacts, "A ContactMotion for each contact")
+      .add_property("contacts", &Elements<&Examination::contacts>::get,
+                    "A ContactMotion for each contact")
       .add_property("parts", &getParts, "A PartRobot.Part for each part of the contacts")
-      .add_property("part_motions", &getPartMotions,
+      .add_property("part_motions", &Elements<&Examination::part_motions>::get,
                     "A ContactMotion for each of them, with velocities relative to the ground")
       .def_readonly("inference", &Examination::inference, "The ContactInference, of the parts")
       .add_property("ground", &Rows<&Examination::ground>::get,

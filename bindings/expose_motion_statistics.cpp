@@ -123,7 +123,8 @@ void exposeMotionStatistics() {
                     "Mean over these frames of the vertical force of all of them [m g]")
       .def("mayBeLoad", &Statistics::mayBeLoad, bp::arg("self"),
            "Whether the mean residual may be that of a load which nobody has told of: it is large\n"
-           "enough, and much the same all the time.")
+           "enough, and much the same all the time, but no larger than what is carried, and pulls\n"
+           "along the ground by no more than a load does. Not where a number is NaN.")
       .def("share", &Statistics::share, (bp::arg("self"), bp::arg("status")),
            "Which part of the frames has a DistributionStatus.")
       .def(PrintVisitor<Statistics>(&writeStatistics))

@@ -18,7 +18,8 @@ bp::list getParts(const HeldContact& held) { return toList(held.parts); }
 
 std::string writeContact(const ContactTerrain& contact) {
   return internal::concat("ContactTerrain(name='", contact.name, "', height=", contact.height,
-                          ", levels=", contact.levels.size(), ")");
+                          ", levels=", contact.levels.size(), ", slopes=", contact.slopes.size(),
+                          ")");
 }
 
 std::string writeHeld(const HeldContact& held) {
@@ -49,11 +50,11 @@ void exposeTerrain() {
           "is never, or the ground is not known")
       .add_property("levels", &getLevels,
                     "Heights of the stances on which it stands, increasing [m]: of the first, and\n"
-                    "of each that differs from all before it by more than 0.05")
+                    "of each that differs from all before it by more than kSameLevel")
       .add_property(
           "slopes", &getSlopes,
           "Inclinations of those that are on a slope, increasing [rad]: of the first, and\n"
-          "of each that differs from all before it by more than 0.002")
+          "of each that differs from all before it by more than kSameSlope")
       .def(PrintVisitor<ContactTerrain>(&writeContact))
       .def(CopyVisitor<ContactTerrain>());
 
@@ -89,6 +90,7 @@ void exposeTerrain() {
       .def(CopyVisitor<Terrain>());
 
   bp::scope().attr("kSameLevel") = kSameLevel;
+  bp::scope().attr("kSameSlope") = kSameSlope;
   bp::scope().attr("kHeldDuration") = kHeldDuration;
   bp::def("findTerrain", &find,
           (bp::arg("parts"), bp::arg("inference"), bp::arg("schedule"), bp::arg("ground"),

@@ -6,13 +6,15 @@
 #include <limits>
 #include <type_traits>
 
+#include "newton_limits.hpp"
+
 namespace dynacom::internal {
 
 namespace {
 
-constexpr int kNormal = BoxCone::kNormal;
+using namespace newton;
 
-// All of these are for a problem whose weighted wrench has unit size.
+constexpr int kNormal = BoxCone::kNormal;
 
 // How many steps are taken without ε before those with, and from the state of the last answer.
 constexpr int kFreeSteps = 3;
@@ -24,36 +26,9 @@ constexpr std::size_t kShortAbsence = 10;
 // ε, as a part of the mean compliance: less, if the answer that it leads to is none.
 constexpr double kSlacks[] = {1e-3, 1e-4, 1e-6, 1e-8, 1e-11};
 constexpr int kMaximalSteps = 50;
-// Along a step, what part of the slope at its start is as good as none.
-constexpr double kFlat = 0.6;
-// How often a step is cut, and how often until it is enough to have come to another state.
-constexpr int kMaximalCuts = 30;
-constexpr int kEasyCuts = 3;
-// For which ratio of two lengths their middle is the geometric one.
-constexpr double kFarApart = 4.;
-// What part of the largest compliance the least must be, so that nothing needs to be asked about
-// the rank.
-constexpr double kFullRank = 1e-6;
-// Of a direction of the wrenches that the contacts give, what remains outside of the others: more
-// than the first, it is one of its own, less than the second, it is rounding.
-constexpr double kIndependent = 1e-5;
-constexpr double kDependent = 1e-11;
-// The distance from the closest wrench: more than the first, times how far wrench weights are
-// apart, it has digits enough, less than the second, it is rounding.
-constexpr double kFar = 1e-4;
-constexpr double kReached = 1e-13;
-// What an answer may lack, and until when it is refined out of reach, where what is missing is to
-// be accurate, too.
-constexpr double kMissing = 1e-12;
+// Until when an answer is refined out of reach, where what is missing is to be accurate, too.
 constexpr double kExact = 4e-16;
 constexpr int kRefinements = 3;
-// By how much the signs of an answer may be wrong, beside the terms that make them up.
-constexpr double kRounding = 1e-12;
-// Of the distance, a multiplier that is not zero, and one that is.
-constexpr double kHeld = 1e-8;
-constexpr double kFree = 1e-12;
-// By how much terms may be larger than the costs that they make up.
-constexpr double kCancellation = 1e6;
 
 // Calls a function with an integral_constant for the number of a contact's components, so that the
 // compiler knows it.

@@ -3,46 +3,22 @@
 
 #include <algorithm>
 
+#include "newton_limits.hpp"
+
 namespace dynacom::lanes {
 namespace {
 
-// All of these are for a problem whose weighted wrench has unit size, as in dual_newton.cpp.
+using namespace newton;
 
 constexpr int kNormal = Cone::kNormal;
 // ε of each attempt, as parts of the mean compliance, at first and at last.
 constexpr double kSlacks[DualNewton::kAttempts][2] = {{1e-5, 1e-8}, {1e-4, 1e-9}};
 // How many steps a search may take.
 constexpr int kMaximalSteps = 20;
-// Along a step, what part of the slope at its start is as good as none.
-constexpr double kFlat = 0.6;
-// How often a step is cut, and how often until it is enough to have come to another state.
-constexpr int kMaximalCuts = 30;
-constexpr int kEasyCuts = 3;
-// For which ratio of two lengths their middle is the geometric one.
-constexpr double kFarApart = 4.;
-// What part of the largest pivot the least must be, so that the contacts give all wrenches.
-constexpr double kFullRank = 1e-6;
-// Of a direction of the wrenches that the contacts give, what remains outside of the others: more
-// than the first, it is one of its own, less than the second, it is rounding.
-constexpr double kIndependent = 1e-5;
-constexpr double kDependent = 1e-11;
-// The distance from the closest wrench: more than the first, times how far wrench weights are
-// apart, it has digits enough, less than the second, it is rounding. Over this distance, rounding
-// of a unit wrench is 1e-10, two digits below what is taken for a multiplier.
-constexpr double kFar = 1e-6;
-constexpr double kReached = 1e-13;
-// What an answer may lack, and how often it is corrected, beginning with none; out of reach more
-// often, because there what is missing is to be accurate, too.
-constexpr double kMissing = 1e-12;
+// How often an answer is corrected, beginning with none; out of reach more often, because there
+// what is missing is to be accurate, too.
 constexpr int kFreeCorrections = 2;
 constexpr int kCorrections = 3;
-// By how much the signs of an answer may be wrong, beside the terms that make them up.
-constexpr double kRounding = 1e-12;
-// Of the distance, a multiplier that is not zero, and one that is.
-constexpr double kHeld = 1e-8;
-constexpr double kFree = 1e-12;
-// By how much terms may be larger than the costs that they make up.
-constexpr double kCancellation = 1e6;
 
 inline Wrench difference(const Wrench& a, const Wrench& b) {
   Wrench c;
@@ -148,16 +124,17 @@ DualNewton::DualNewton(const std::vector<Contact>& contacts) : cones_(contacts.s
   directions_.reserve(6 * contacts.size());
 }
 
-// Enters the state in which all contacts bear a load and no component is at its bound, from which
-// the first step leads to the closed form for forces without inequalities; with multipliers of
-// zero.
+// Enters the state in which all contacts that are there bear a load and no component is at its
+// bound, from which the first step leads to the closed form for forces without inequalities; with
+// multipliers of zero. Where a contact is not there, it has the state that it keeps.
 void DualNewton::begin() {
   setZero(multipliers_);
   for (Cone& cone : cones_) {
     if (!cone.is_there) continue;
-    cone.loaded = cone.inverse_stiffness = 1.;
+    cone.loaded = select(cone.isPresent(), 1., 0.);
+    cone.inverse_stiffness = 1.;
     for (int i = 0; i < cone.size; ++i) {
-      cone.bounds[i] = i == kNormal || cone.betas[i] == 0. ? 1. : 0.;
+      cone.bounds[i] = i == kNormal || cone.betas[i] == 0. ? cone.loaded : Lanes(0.);
       cone.pull[i] = 0.;
     }
   }

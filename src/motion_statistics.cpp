@@ -121,6 +121,7 @@ bool MotionStatistics::mayBeLoad() const {
   const double torque = mean_residual.tail<3>().norm() / weight;
   const double pull = mean_residual.head<2>().norm() / weight;
   if (!(pull < kPull) || !(force < kLargestLoad) || !(torque < kLargestLoad)) return false;
+  if (std::isnan(residual_force_rms) || std::isnan(residual_torque_rms)) return false;
   return force > std::max(kLoad, kLoadPart * residual_force_rms) ||
          torque > std::max(kLoad, kLoadPart * residual_torque_rms);
 }

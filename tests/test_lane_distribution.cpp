@@ -103,6 +103,16 @@ class Stand {
     return result;
   }
 
+  /// One of its frames.
+  Stand only(Index frame) const {
+    Stand one = *this;
+    one.motion_ = {motion_.time.segment(frame, 1), motion_.q.col(frame), motion_.v.col(frame),
+                   motion_.a.col(frame)};
+    one.schedule_.active = schedule_.active.col(frame);
+    one.schedule_.readiness = schedule_.readiness.col(frame);
+    return one;
+  }
+
   /// Takes the frames from last to first.
   void reverse() {
     motion_.a = motion_.a.rowwise().reverse().eval();
@@ -320,4 +330,31 @@ BOOST_AUTO_TEST_CASE(a_frame_does_not_depend_on_those_beside_it) {
       BOOST_TEST((forwards.contacts[k].wrench == backwards.contacts[k].wrench.rowwise().reverse()));
     BOOST_TEST((forwards.residual == backwards.residual.rowwise().reverse()));
   }
+}
+
+BOOST_AUTO_TEST_CASE(a_frame_has_the_forces_that_it_has_alone) {
+  // Bit for bit, also where those beside it have contacts that it does not have.
+  const Vector3d left(0., 0.12, -0.7), right(0., -0.12, -0.7), behind(-0.2, 0., -0.7);
+  const std::map<std::string, std::vector<ProblemContact>> sorts = {
+      {"corners of two soles", makeCorners()},
+      {"points", {makePoint(left), makePoint(right), makePoint(behind)}},
+      {"soles and a point", {makeSole(left), makeSole(right), makePoint(behind, 0.)}},
+  };
+  for (const auto& [name, contacts] : sorts) BOOST_TEST_CONTEXT(name) {
+      Random random(306);
+      const Problem problem = makeProblem(contacts);
+      const Stand stand(problem, makeWrenches(problem.wrench, random, 301), random);
+      for (const int lanes : findLanes(stand.robot())) {
+        const MotionAnalysis together = stand.analyze(lanes);
+        for (Index frame = 0; frame < stand.frames(); ++frame) {
+          BOOST_TEST_CONTEXT(lanes << " lanes, frame " << frame) {
+            const MotionAnalysis alone = stand.only(frame).analyze(lanes);
+            BOOST_TEST(alone.status[0] == together.status[static_cast<std::size_t>(frame)]);
+            BOOST_TEST((alone.residual == together.residual.col(frame)));
+            for (std::size_t k = 0; k < contacts.size(); ++k)
+              BOOST_TEST((alone.contacts[k].wrench == together.contacts[k].wrench.col(frame)));
+          }
+        }
+      }
+    }
 }

@@ -220,6 +220,25 @@ BOOST_AUTO_TEST_CASE(a_load_is_lacked_all_the_time) {
   BOOST_TEST(!mayBeLoad(0.05, 0.4, 0.));
 }
 
+BOOST_AUTO_TEST_CASE(what_is_not_known_may_be_no_load) {
+  Case some;
+  some.analysis.residual.row(2).setConstant(0.05 * 98.1);
+  BOOST_TEST(some.summarize().mayBeLoad());
+  MotionStatistics statistics = some.summarize();
+  statistics.residual_force_rms = kNaN;
+  BOOST_TEST(!statistics.mayBeLoad());
+  // A frame that is left out of the mean, but not out of the root mean square.
+  for (const Index row : {2, 4}) {
+    Case other = some;
+    other.analysis.residual(row, 3) = kNaN;
+    other.verdict.unsure[3] = true;
+    BOOST_TEST(other.summarize().mean_residual.allFinite());
+    BOOST_TEST(!other.summarize().mayBeLoad());
+    other.verdict.unsure[3] = false;
+    BOOST_TEST(!other.summarize().mayBeLoad());
+  }
+}
+
 BOOST_AUTO_TEST_CASE(a_single_frame_has_no_change) {
   const Case some(1);
   BOOST_TEST(some.summarize().momentum_change == 0.);

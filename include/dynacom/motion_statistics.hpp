@@ -60,7 +60,7 @@ struct DYNACOM_EXPORT MotionStatistics {
   double share(DistributionStatus status) const;
   /// Whether the mean residual may be that of a load which nobody has told of: it is large enough,
   /// and much the same all the time, but no larger than what is carried, and pulls along the ground
-  /// by no more than a load does.
+  /// by no more than a load does. Not where a number is NaN.
   bool mayBeLoad() const;
 };
 

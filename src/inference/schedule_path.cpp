@@ -165,12 +165,16 @@ class PathFinder {
       Index behind = first;
       while (behind < frames && !certain[static_cast<std::size_t>(behind)]) ++behind;
       findBetween(first, behind);
+      for (Index frame = first; frame < behind; ++frame) forget(frame);
       first = behind - 1;
     }
     return std::move(found_);
   }
 
  private:
+  // What sets are missing, as far as that is known.
+  using Projections = std::vector<std::pair<Mask, Eigen::Vector2d>>;
+
   // How long a frame lasts; one that is alone as long as one likes.
   double duration(Index frame) const {
     const Index last = time_.size() - 1;
@@ -188,6 +192,8 @@ class PathFinder {
   void makeSets(Index frame, FrameSets& sets);
   static void combineLevels(FrameSets& sets);
   Eigen::Vector2d findMissing(Index frame, Mask set);
+  // Gives back the memory of what sets are missing in a frame, of which nobody asks again.
+  void forget(Index frame) { Projections().swap(projected_[static_cast<std::size_t>(frame)]); }
   float costOf(const Eigen::Vector2d& missing, Index frame) const;
   float leastCostOf(const Eigen::Vector2d& missing, Index frame) const;
   void evaluate(FrameSets& sets, Index frame, std::size_t number) {
@@ -200,6 +206,8 @@ class PathFinder {
   Choice choose(Index frame);
   Choice chooseAmongAll(Index frame);
   std::vector<bool> chooseCertain();
+  void markCertain(std::size_t first, const std::vector<Choice>& choices,
+                   std::vector<bool>& certain);
 
   void findBetween(Index first, Index behind);
   void findChanges(const FrameSets& before, Index frame, FrameSets& sets) const;
@@ -220,8 +228,8 @@ class PathFinder {
   std::vector<std::vector<int>> limbs_;  // points of each
   std::vector<Mask> limb_masks_;
   ConeProjection projection_;
-  std::vector<std::vector<std::pair<Mask, Eigen::Vector2d>>> projected_;  // what is known, by frame
-  Index placed_ = -1;                                                     // the frame of the levers
+  std::vector<Projections> projected_;  // by frame, as long as somebody may ask for them
+  Index placed_ = -1;                   // the frame of the levers
   Eigen::Matrix3Xd levers_;
   std::vector<std::pair<double, int>> order_;  // of a limb's points
   FrameSets one_;                              // of a frame by itself
@@ -344,8 +352,7 @@ void PathFinder::combineLevels(FrameSets& sets) {
 // What a set cannot give in a frame: norms of force [m g] and moment [m g m]. It is asked for again
 // where a frame's own choice is not certain.
 Eigen::Vector2d PathFinder::findMissing(Index frame, Mask set) {
-  std::vector<std::pair<Mask, Eigen::Vector2d>>& known =
-      projected_[static_cast<std::size_t>(frame)];
+  Projections& known = projected_[static_cast<std::size_t>(frame)];
   for (const auto& [other, missing] : known)
     if (other == set) return missing;
   if (placed_ != frame)
@@ -458,27 +465,35 @@ bool PathFinder::isDetourProbable(Index frame, float gap) const {
 std::vector<bool> PathFinder::chooseCertain() {
   const auto frames = static_cast<std::size_t>(time_.size());
   std::vector<bool> certain(frames, false);
-  std::vector<float> gaps(frames), ratios(frames);
+  std::vector<Choice> choices;  // since the cheapest set has been the same
   for (std::size_t frame = 0; frame < frames; ++frame) {
     const Choice choice = choose(Index(frame));
     found_.sets[frame] = choice.set;
-    gaps[frame] = choice.gap;
-    ratios[frame] = choice.ratio;
-  }
-  for (std::size_t first = 0, behind = 0; first < frames; first = behind) {
-    float ratio = 0.f;
-    for (; behind < frames && found_.sets[behind] == found_.sets[first]; ++behind)
-      ratio += ratios[behind];
-    if (!(ratio >= 2.f)) continue;
-    float since = 0.f, until = 0.f;
-    for (std::size_t frame = first; frame < behind; ++frame) {
-      certain[frame] =
-          (since += gaps[frame]) >= kImprobable && !isDetourProbable(Index(frame), gaps[frame]);
+    if (!choices.empty() && choices.back().set != choice.set) {
+      markCertain(frame - choices.size(), choices, certain);
+      choices.clear();
     }
-    for (std::size_t frame = behind; frame-- > first && until < kImprobable;)
-      if ((until += gaps[frame]) < kImprobable) certain[frame] = false;
+    choices.push_back(choice);
   }
+  markCertain(frames - choices.size(), choices, certain);
   return certain;
+}
+
+// Says which of the frames that have the same cheapest set are certain.
+void PathFinder::markCertain(std::size_t first, const std::vector<Choice>& choices,
+                             std::vector<bool>& certain) {
+  float ratio = 0.f;
+  for (const Choice& choice : choices) ratio += choice.ratio;
+  if (!(ratio >= 2.f)) return;
+  float since = 0.f, until = 0.f;
+  for (std::size_t k = 0; k < choices.size(); ++k) {
+    const float gap = choices[k].gap;
+    certain[first + k] = (since += gap) >= kImprobable && !isDetourProbable(Index(first + k), gap);
+  }
+  for (std::size_t k = choices.size(); k-- > 0 && until < kImprobable;)
+    if ((until += choices[k].gap) < kImprobable) certain[first + k] = false;
+  for (std::size_t k = 0; k < choices.size(); ++k)
+    if (certain[first + k]) forget(Index(first + k));
 }
 
 // Finds the path through frames that are not certain, from and to those around them.

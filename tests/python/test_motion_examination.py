@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-2-Clause
+import copy
+import gc
 import threading
 import time
+import weakref
 
 import numpy as np
 import pinocchio as pin
@@ -119,3 +122,25 @@ def test_a_robot_without_contacts_falls(talos):
     found = MotionExaminer(DynaCoM(model), 0.0).examine(RecordedMotion(times, q))
     assert found.verdict.feasible
     assert found.statistics.mean_vertical_force == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_it_holds_is_not_copied_and_outlives_it(talos, recorded):
+    """An hour has hundreds of megabytes of it."""
+    found = MotionExaminer(talos.dynacom(), sensitivity=False).examine(recorded)
+    analysis = found.analysis
+    lists = (found.contacts, found.part_motions, analysis.contacts, analysis.parts)
+    firsts = [elements[0] for elements in lists]
+    kept = [(first.name, str(first)) for first in firsts]
+    motion, contact = firsts[0].position, firsts[2].wrench
+    copied = copy.copy(firsts[2])
+    owner = weakref.ref(found)
+    del lists, analysis, found
+    gc.collect()
+    assert owner() is not None
+    assert [(first.name, str(first)) for first in firsts] == kept
+    assert_array_equal(firsts[0].position, motion)
+    assert_array_equal(firsts[2].wrench, contact)
+    del firsts
+    gc.collect()
+    assert owner() is None
+    assert_array_equal(copied.wrench, contact)

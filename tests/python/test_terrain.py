@@ -43,6 +43,24 @@ def test_grounds_are_those_of_the_arrays(talos, report):
     assert found.terrain.held == []
 
 
+def test_what_differs_is_said_by_how_much():
+    """As the docstrings call it."""
+    assert dynacom.kSameLevel > 0.0
+    assert dynacom.kSameSlope > 0.0
+    assert "kSameLevel" in dynacom.ContactTerrain.levels.__doc__
+    assert "kSameSlope" in dynacom.ContactTerrain.slopes.__doc__
+
+
+def test_printing_tells_all(report):
+    found = report.examination
+    contact = found.terrain.contacts[0]
+    assert f"levels={len(contact.levels)}, slopes={len(contact.slopes)}" in str(contact)
+    stance = found.inference.stances[0]
+    text = str(stance)
+    for name in ("part", "first", "behind", "height", "on_ground", "begin", "end"):
+        assert f"{name}={getattr(stance, name):.6g}" in text or f"{name}=True" in text
+
+
 def test_it_is_found_from_what_was_found(report):
     found = report.examination
     given = (found.parts, found.inference, found.schedule, found.ground, found.analysis.time)
