@@ -78,6 +78,23 @@ bool ConeProjection::solve() {
   return true;
 }
 
+Eigen::Matrix<double, 6, 6> ConeProjection::normal() const {
+  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Identity();
+  // Gram–Schmidt
+  Eigen::Matrix<double, 6, kEdges> basis;
+  int rank = 0;
+  for (int k = 0; k < count_; ++k) {
+    Vector6 v = columns_.col(k);
+    const double size = v.norm();
+    for (int pass = 0; pass < 2; ++pass)
+      for (int i = 0; i < rank; ++i) v -= basis.col(i).dot(v) * basis.col(i);
+    if (v.norm() < 1e-6 * size) continue;
+    basis.col(rank++) = v.normalized();
+  }
+  for (int i = 0; i < rank; ++i) normal -= basis.col(i) * basis.col(i).transpose();
+  return normal;
+}
+
 double ConeProjection::lift(std::uint32_t set) const {
   double sum = 0.;
   for (int k = 0; k < count_; ++k)
@@ -105,7 +122,7 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
   }
   std::copy_n(solution_.begin(), count_, factors_.begin());
 
-  Vector6 residual;
+  Vector6& residual = residual_;
   for (int round = 0; round < kRounds; ++round) {
     residual = target_;
     for (int k = 0; k < count_; ++k) residual -= factors_[k] * columns_.col(k);
@@ -121,7 +138,8 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
       const double friction = mu[static_cast<std::size_t>(point)];
       const double value = friction * (std::abs(pull.x()) + std::abs(pull.y())) + pull.z();
       if (value <= slope) continue;
-      const Edge edge = {point, pull.x() < 0. ? -1 : 1, pull.y() < 0. ? -1 : 1};
+      const Edge edge = {std::int8_t(point), std::int8_t(pull.x() < 0. ? -1 : 1),
+                         std::int8_t(pull.y() < 0. ? -1 : 1)};
       const auto known = edges_.begin() + count_;
       if (std::find(edges_.begin(), known, edge) == known) best = edge, slope = value;
     }
