@@ -29,25 +29,21 @@ BOOST_AUTO_TEST_CASE(systems_are_solved_as_by_a_dense_decomposition) {
     for (const Index blocks : {1, 2, 7}) {
       const MatrixXd matrix = randomMatrix(random, blocks, 3, band);
       BlockBand<3> system;
-      system.resize(blocks, band);
+      system.resize(3, blocks, band);
       for (Index row = 0; row < blocks; ++row)
         for (Index column = std::max<Index>(row - band, 0); column <= row; ++column)
           system(row, column) = matrix.block<3, 3>(3 * row, 3 * column);
       BOOST_TEST(system.factorize());
       const VectorXd rhs = random.vector(3 * blocks);
-      std::vector<Vector3d> x;
-      for (Index row = 0; row < blocks; ++row) x.push_back(rhs.segment<3>(3 * row));
+      Eigen::Matrix3Xd x = rhs.reshaped(3, blocks);
       system.solve(x);
-      VectorXd solution(3 * blocks);
-      for (Index row = 0; row < blocks; ++row)
-        solution.segment<3>(3 * row) = x[static_cast<std::size_t>(row)];
-      BOOST_TEST(close(solution, matrix.llt().solve(rhs), 1e-9));
+      BOOST_TEST(close(x.reshaped(), matrix.llt().solve(rhs), 1e-9));
     }
 }
 
 BOOST_AUTO_TEST_CASE(a_matrix_that_is_not_positive_is_refused) {
   BlockBand<3> system;
-  system.resize(2, 1);
+  system.resize(3, 2, 1);
   system(0, 0).setIdentity();
   system(1, 1).setIdentity();
   system(1, 0) = 2. * Matrix3d::Identity();

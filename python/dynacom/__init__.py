@@ -15,6 +15,8 @@ from dynacom.analysis_options import AnalysisOptions
 from dynacom.batch import BatchProgress, batch
 from dynacom.dynacom_pywrap import (
     BodyPoints,
+    CentroidalChange,
+    CentroidalFilterSettings,
     CentroidalState,
     CentroidalWrench,
     CollisionPoints,
@@ -69,6 +71,7 @@ from dynacom.dynacom_pywrap import (
     deriveMotion,
     describeFaults,
     differentiate,
+    distanceToFeasible,
     estimateAccelerationNoise,
     filterConfigurations,
     findCollisionPoints,
@@ -123,6 +126,8 @@ __all__ = [
     "CutoffSensitivity",
     "DerivativeMismatch",
     "DerivedMotion",
+    "CentroidalChange",
+    "CentroidalFilterSettings",
     "DetectionSettings",
     "DistributionResult",
     "DistributionStatus",
@@ -173,6 +178,7 @@ __all__ = [
     "findCollisionPoints",
     "findFrameRate",
     "gatherParts",
+    "distanceToFeasible",
     "inferContacts",
     "judgeMotion",
     "kAccelerationMismatch",

@@ -78,21 +78,13 @@ bool ConeProjection::solve() {
   return true;
 }
 
-Eigen::Matrix<double, 6, 6> ConeProjection::normal() const {
-  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Identity();
-  // Gram–Schmidt
-  Eigen::Matrix<double, 6, kEdges> basis;
-  int rank = 0;
-  for (int k = 0; k < count_; ++k) {
-    Vector6 v = columns_.col(k);
-    const double size = v.norm();
-    for (int pass = 0; pass < 2; ++pass)
-      for (int i = 0; i < rank; ++i) v -= basis.col(i).dot(v) * basis.col(i);
-    if (v.norm() < 1e-6 * size) continue;
-    basis.col(rank++) = v.normalized();
-  }
-  for (int i = 0; i < rank; ++i) normal -= basis.col(i) * basis.col(i).transpose();
-  return normal;
+Eigen::Vector3d ConeProjection::force(int point, const std::vector<double>& mu) const {
+  const double friction = mu[static_cast<std::size_t>(point)];
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int k = 0; k < count_; ++k)
+    if (edges_[k].point == point)
+      sum += factors_[k] * Eigen::Vector3d(edges_[k].x * friction, edges_[k].y * friction, 1.);
+  return sum;
 }
 
 double ConeProjection::lift(std::uint32_t set) const {

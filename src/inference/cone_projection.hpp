@@ -45,8 +45,8 @@ class ConeProjection {
     return residual;
   }
 
-  /// The derivative of the residual, scaled.
-  Eigen::Matrix<double, 6, 6> normal() const;
+  /// The force that a point gives in the last answer. There may be other answers that are as close.
+  Eigen::Vector3d force(int point, const std::vector<double>& mu) const;
 
   /// The vertical force that some points gave together in the last answer. There may be other
   /// answers that are as close.

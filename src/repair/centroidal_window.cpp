@@ -47,17 +47,17 @@ CentroidalWindow::CentroidalWindow(const CentroidalProblem& problem,
       levers_(3, Index(problem.points.size())) {}
 
 Eigen::Vector3d CentroidalWindow::angularMomentum(Index k) const {
-  Eigen::Vector3d sum = x_[at(k)].tail<3>();
-  if (k > 0) sum += x_[at(k - 1)].tail<3>();
+  Eigen::Vector3d sum = x_.col(k).tail<3>();
+  if (k > 0) sum += x_.col(k - 1).tail<3>();
   return 0.5 * sum;
 }
 
 double CentroidalWindow::cost() const {
   double cost = 0.;
   for (Index k = 0; k < frames_; ++k)
-    cost += differences_[at(k)].duration * (of_displacement_ * x_[at(k)].head<3>().squaredNorm() +
+    cost += differences_[at(k)].duration * (of_displacement_ * x_.col(k).head<3>().squaredNorm() +
                                             of_acceleration_ * acceleration(k).squaredNorm() +
-                                            of_momentum_ * x_[at(k)].tail<3>().squaredNorm());
+                                            of_momentum_ * x_.col(k).tail<3>().squaredNorm());
   return cost;
 }
 
@@ -66,8 +66,9 @@ void CentroidalWindow::solve(Index first, Index frames) {
   frames_ = frames;
   discretize();
   const auto count = static_cast<std::size_t>(frames);
-  for (Vectors* values : {&x_, &step_, &dual_, &last_given_})
-    values->assign(count, Vector6::Zero());
+  x_.setZero(6, frames);
+  step_.setZero(6, frames);
+  for (Vectors* values : {&dual_, &last_given_}) values->assign(count, Vector6::Zero());
   answers_.assign(count, {});
   moved_.resize(count);
   for (Index k = 0; k < frames; ++k) moved_[at(k)] = problem_.wrench.col(first + k);
@@ -111,9 +112,9 @@ void CentroidalWindow::discretize() {
 // δ̈ over g.
 Eigen::Vector3d CentroidalWindow::acceleration(Index k) const {
   const Difference& difference = differences_[at(k)];
-  Eigen::Vector3d sum = difference.here * x_[at(k)].head<3>();
-  if (k > 0) sum += difference.before * x_[at(k - 1)].head<3>();
-  if (!isLast(k)) sum += difference.after * x_[at(k + 1)].head<3>();
+  Eigen::Vector3d sum = difference.here * x_.col(k).head<3>();
+  if (k > 0) sum += difference.before * x_.col(k - 1).head<3>();
+  if (!isLast(k)) sum += difference.after * x_.col(k + 1).head<3>();
   return sum;
 }
 
@@ -121,17 +122,17 @@ CentroidalWindow::Vector6 CentroidalWindow::computeWrench(Index k) const {
   Vector6 wrench = problem_.wrench.col(first_ + k);
   wrench.head<3>() += acceleration(k);
   Eigen::Vector3d momentum_step = Eigen::Vector3d::Zero();
-  if (!isLast(k)) momentum_step += x_[at(k)].tail<3>();
-  if (k > 0) momentum_step -= x_[at(k - 1)].tail<3>();
+  if (!isLast(k)) momentum_step += x_.col(k).tail<3>();
+  if (k > 0) momentum_step -= x_.col(k - 1).tail<3>();
   wrench.tail<3>() += momentum_step / differences_[at(k)].duration +
-                      x_[at(k)].head<3>().cross(Eigen::Vector3d(wrench.head<3>()));
+                      x_.col(k).head<3>().cross(Eigen::Vector3d(wrench.head<3>()));
   return wrench;
 }
 
 // The second derivative of the augmented Lagrangian, in which a frame's wrench has the derivative A
 // by the changes of the frame and its neighbours.
 void CentroidalWindow::factorize() {
-  system_.resize(frames_, 2);
+  system_.resize(6, frames_, 2);
   Eigen::Matrix<double, 6, 18> A;
   for (Index k = 0; k < frames_; ++k) {
     const Difference& difference = differences_[at(k)];
@@ -139,7 +140,7 @@ void CentroidalWindow::factorize() {
     system_(k, k).diagonal().head<3>().array() += dt * of_displacement_;
     system_(k, k).diagonal().tail<3>().array() += dt * of_momentum_;
     const double factors[3] = {difference.before, difference.here, difference.after};
-    const Eigen::Matrix3d displaced = skew(x_[at(k)].head<3>()) / kLever;
+    const Eigen::Matrix3d displaced = skew(x_.col(k).head<3>()) / kLever;
     A.setZero();
     for (int i = 0; i < 3; ++i) {
       A.block<3, 3>(0, 6 * i).diagonal().setConstant(factors[i]);
@@ -165,28 +166,28 @@ void CentroidalWindow::factorize() {
 // Newton's step to the changes that minimise the augmented Lagrangian, with the factors that there
 // are, and the gradient of now.
 void CentroidalWindow::change() {
-  for (Vector6& step : step_) step.setZero();
+  step_.setZero();
   for (Index k = 0; k < frames_; ++k) {
     const Difference& difference = differences_[at(k)];
     const double dt = difference.duration;
-    step_[at(k)].head<3>() -= dt * of_displacement_ * x_[at(k)].head<3>();
-    step_[at(k)].tail<3>() -= dt * of_momentum_ * x_[at(k)].tail<3>();
+    step_.col(k).head<3>() -= dt * of_displacement_ * x_.col(k).head<3>();
+    step_.col(k).tail<3>() -= dt * of_momentum_ * x_.col(k).tail<3>();
     Eigen::Vector3d by_acceleration = of_acceleration_ * acceleration(k);
     if (!problem_.free[first_ + k]) {
       const Vector6 off = penalty_ * (moved_[at(k)] - given_[at(k)] + dual_[at(k)]);
       const Eigen::Vector3d by_moment = off.tail<3>() / square(kLever);
-      const Eigen::Vector3d force = moved_[at(k)].head<3>(), displaced = x_[at(k)].head<3>();
+      const Eigen::Vector3d force = moved_[at(k)].head<3>(), displaced = x_.col(k).head<3>();
       by_acceleration += off.head<3>() + by_moment.cross(displaced);
-      step_[at(k)].head<3>() -= dt * force.cross(by_moment);
-      if (!isLast(k)) step_[at(k)].tail<3>() -= by_moment;
-      if (k > 0) step_[at(k - 1)].tail<3>() += by_moment;
+      step_.col(k).head<3>() -= dt * force.cross(by_moment);
+      if (!isLast(k)) step_.col(k).tail<3>() -= by_moment;
+      if (k > 0) step_.col(k - 1).tail<3>() += by_moment;
     }
-    step_[at(k)].head<3>() -= dt * difference.here * by_acceleration;
-    if (k > 0) step_[at(k - 1)].head<3>() -= dt * difference.before * by_acceleration;
-    if (!isLast(k)) step_[at(k + 1)].head<3>() -= dt * difference.after * by_acceleration;
+    step_.col(k).head<3>() -= dt * difference.here * by_acceleration;
+    if (k > 0) step_.col(k - 1).head<3>() -= dt * difference.before * by_acceleration;
+    if (!isLast(k)) step_.col(k + 1).head<3>() -= dt * difference.after * by_acceleration;
   }
   system_.solve(step_);
-  for (Index k = 0; k < frames_; ++k) x_[at(k)] += step_[at(k)];
+  x_ += step_;
   for (Index k = 0; k < frames_; ++k) moved_[at(k)] = computeWrench(k);
 }
 
@@ -219,8 +220,8 @@ bool CentroidalWindow::isDone() const {
   double missing = 0., step = 0., size = 0.;
   for (Index k = 0; k < frames_; ++k) {
     missing += residual(k).squaredNorm();
-    step += step_[at(k)].head<3>().squaredNorm();
-    size += x_[at(k)].head<3>().squaredNorm();
+    step += step_.col(k).head<3>().squaredNorm();
+    size += x_.col(k).head<3>().squaredNorm();
   }
   const auto frames = double(frames_);
   return missing <= square(settings_.reach) * frames &&

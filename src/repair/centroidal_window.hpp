@@ -35,7 +35,7 @@ class CentroidalWindow {
   void solve(Eigen::Index first, Eigen::Index frames);
 
   // What was found in a frame, counted from the first.
-  Eigen::Vector3d displacement(Eigen::Index k) const { return x_[at(k)].head<3>(); }
+  Eigen::Vector3d displacement(Eigen::Index k) const { return x_.col(k).head<3>(); }
   Eigen::Vector3d angularMomentum(Eigen::Index k) const;  // [m g·m·s]
   Vector6 residual(Eigen::Index k) const { return moved_[at(k)] - given_[at(k)]; }
   /// The integral that is minimised.
@@ -70,7 +70,8 @@ class CentroidalWindow {
   std::vector<Difference> differences_;
   double penalty_ = 0.;  // ρ of ADMM
   BlockBand<6> system_;
-  Vectors x_, step_;       // of each frame δ, and h half a frame later; and what it changed by
+  // Of each frame δ, and h half a frame later; and by how much the last iteration changed these.
+  Eigen::Matrix<double, 6, Eigen::Dynamic> x_, step_;
   Vectors moved_, given_;  // wrenches after the change, and the closest ones that contacts can give
   Vectors last_given_;     // an iteration before
   Vectors dual_;           // multipliers of moved = given, over ρ
