@@ -132,6 +132,19 @@ BOOST_AUTO_TEST_CASE(in_flight_the_com_is_put_on_its_parabola) {
   BOOST_TEST(found.residual.isZero(1e-4 * kWeight));
 }
 
+BOOST_AUTO_TEST_CASE(who_is_in_the_air_all_the_time_falls) {
+  Stander falling(60);
+  falling.schedule.active.setConstant(false);
+  const CentroidalChange found = falling.filter(exactSettings());
+  BOOST_TEST(found.converged);
+  BOOST_TEST(found.com.allFinite());
+  for (Index k = 1; k < 59; ++k) {
+    const Vector3d change =
+        (found.com.col(k + 1) - 2. * found.com.col(k) + found.com.col(k - 1)) / (0.01 * 0.01);
+    BOOST_TEST(close(change, Vector3d(0., 0., -kGravity), 1e-4));
+  }
+}
+
 BOOST_AUTO_TEST_CASE(windows_hardly_show_and_threads_do_not) {
   Stander stander = makeSwaying(1200, 4);
   for (Index k = 0; k < 1200; ++k) stander.schedule.active.col(k).setConstant(true);

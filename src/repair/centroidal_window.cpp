@@ -21,8 +21,8 @@ constexpr double kPenalty = 1000., kRelaxation = 1.6;
 // other way round (Boyd et al., 3.4.1).
 constexpr int kAdaptation = 5;
 constexpr double kImbalance = 4., kFactor = 8.;
-// A displacement that is smaller does not matter, RMS [m].
-constexpr double kNegligible = 1e-5;
+// A displacement that is smaller does not matter, and one that is larger is none, RMS [m].
+constexpr double kNegligible = 1e-5, kLost = 10.;
 // Moments count as forces with this lever [m].
 constexpr double kLever = 1.;
 
@@ -55,9 +55,10 @@ Eigen::Vector3d CentroidalWindow::angularMomentum(Index k) const {
 double CentroidalWindow::cost() const {
   double cost = 0.;
   for (Index k = 0; k < frames_; ++k)
-    cost += differences_[at(k)].duration * (of_displacement_ * x_.col(k).head<3>().squaredNorm() +
-                                            of_acceleration_ * acceleration(k).squaredNorm() +
-                                            of_momentum_ * x_.col(k).tail<3>().squaredNorm());
+    cost +=
+        differences_[at(k)].duration * (of_displacement_ * x_.col(k).head<3>().squaredNorm() +
+                                        differences_[at(k)].cost * acceleration(k).squaredNorm() +
+                                        of_momentum_ * x_.col(k).tail<3>().squaredNorm());
   return cost;
 }
 
@@ -82,18 +83,22 @@ void CentroidalWindow::solve(Index first, Index frames) {
     last_given_ = given_;
     project();
     converged_ = isDone();
-    if (converged_) return;
-    if (iterations_ % kAdaptation == 0) adaptPenalty();
+    if (converged_ || !(x_.topRows<3>().squaredNorm() < square(kLost) * double(frames))) return;
+    if (iterations_ % kAdaptation == 0) {
+      adaptPenalty();
+      factorize();
+    }
   }
   --iterations_;
 }
 
 // Second differences for times that need not be even, of a path that stays at its first and last
-// place before and behind the window.
+// place before and behind the window. Where an end is in flight, nobody knows how fast the CoM was
+// before: nothing is asked there, and nothing costs.
 void CentroidalWindow::discretize() {
   differences_.resize(static_cast<std::size_t>(frames_));
   if (frames_ == 1) {  // as long as one likes
-    differences_[0] = {0., 0., 0., 1.};
+    differences_[0] = {0., 0., 0., 1., 0., problem_.free[first_] ? 0. : 1.};
     return;
   }
   for (Index k = 0; k < frames_; ++k) {
@@ -105,9 +110,14 @@ void CentroidalWindow::discretize() {
     const double duration = 0.5 * (before + after);
     const double to_before = k > 0 ? 1. / (before * duration * kStandardGravity) : 0.;
     const double to_after = isLast(k) ? 0. : 1. / (after * duration * kStandardGravity);
-    differences_[at(k)] = {to_before, -to_before - to_after, to_after, duration};
+    const bool is_open = (k == 0 || isLast(k)) && isFlight(k);
+    differences_[at(k)] = {
+        to_before, -to_before - to_after,           to_after,
+        duration,  is_open ? 0. : of_acceleration_, is_open || problem_.free[first_ + k] ? 0. : 1.};
   }
 }
+
+bool CentroidalWindow::isFlight(Index k) const { return problem_.sets[at(first_ + k)] == 0; }
 
 // δ̈ over g.
 Eigen::Vector3d CentroidalWindow::acceleration(Index k) const {
@@ -118,14 +128,17 @@ Eigen::Vector3d CentroidalWindow::acceleration(Index k) const {
   return sum;
 }
 
+// About the CoM of before; in flight, where there must be none about any point, about that of
+// after, which is linear in the changes.
 CentroidalWindow::Vector6 CentroidalWindow::computeWrench(Index k) const {
   Vector6 wrench = problem_.wrench.col(first_ + k);
   wrench.head<3>() += acceleration(k);
   Eigen::Vector3d momentum_step = Eigen::Vector3d::Zero();
   if (!isLast(k)) momentum_step += x_.col(k).tail<3>();
   if (k > 0) momentum_step -= x_.col(k - 1).tail<3>();
-  wrench.tail<3>() += momentum_step / differences_[at(k)].duration +
-                      x_.col(k).head<3>().cross(Eigen::Vector3d(wrench.head<3>()));
+  wrench.tail<3>() += momentum_step / differences_[at(k)].duration;
+  if (!isFlight(k))
+    wrench.tail<3>() += x_.col(k).head<3>().cross(Eigen::Vector3d(wrench.head<3>()));
   return wrench;
 }
 
@@ -140,24 +153,24 @@ void CentroidalWindow::factorize() {
     system_(k, k).diagonal().head<3>().array() += dt * of_displacement_;
     system_(k, k).diagonal().tail<3>().array() += dt * of_momentum_;
     const double factors[3] = {difference.before, difference.here, difference.after};
-    const Eigen::Matrix3d displaced = skew(x_.col(k).head<3>()) / kLever;
     A.setZero();
-    for (int i = 0; i < 3; ++i) {
-      A.block<3, 3>(0, 6 * i).diagonal().setConstant(factors[i]);
-      A.block<3, 3>(3, 6 * i) = factors[i] * displaced;
+    for (int i = 0; i < 3; ++i) A.block<3, 3>(0, 6 * i).diagonal().setConstant(factors[i]);
+    if (!isFlight(k)) {
+      const Eigen::Matrix3d displaced = skew(x_.col(k).head<3>()) / kLever;
+      for (int i = 0; i < 3; ++i) A.block<3, 3>(3, 6 * i) = factors[i] * displaced;
+      A.block<3, 3>(3, 6) -= skew(moved_[at(k)].head<3>()) / kLever;
     }
-    A.block<3, 3>(3, 6) -= skew(moved_[at(k)].head<3>()) / kLever;
     if (!isLast(k)) A.block<3, 3>(3, 9).diagonal().setConstant(1. / (dt * kLever));
     if (k > 0) A.block<3, 3>(3, 3).diagonal().setConstant(-1. / (dt * kLever));
-    const double penalty = problem_.free[first_ + k] ? 0. : penalty_;
-    const Eigen::Matrix<double, 18, 18> square = dt * penalty * (A.transpose() * A);
+    const Eigen::Matrix<double, 18, 18> square =
+        dt * penalty_ * difference.asked * (A.transpose() * A);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j <= i; ++j) {
         const Index row = k - 1 + i, column = k - 1 + j;
         if (column < 0 || row >= frames_) continue;
         system_(row, column) += square.block<6, 6>(6 * i, 6 * j);
         system_(row, column).diagonal().head<3>().array() +=
-            dt * of_acceleration_ * factors[i] * factors[j];
+            dt * difference.cost * factors[i] * factors[j];
       }
   }
   system_.factorize();
@@ -172,13 +185,16 @@ void CentroidalWindow::change() {
     const double dt = difference.duration;
     step_.col(k).head<3>() -= dt * of_displacement_ * x_.col(k).head<3>();
     step_.col(k).tail<3>() -= dt * of_momentum_ * x_.col(k).tail<3>();
-    Eigen::Vector3d by_acceleration = of_acceleration_ * acceleration(k);
-    if (!problem_.free[first_ + k]) {
+    Eigen::Vector3d by_acceleration = difference.cost * acceleration(k);
+    if (difference.asked > 0.) {
       const Vector6 off = penalty_ * (moved_[at(k)] - given_[at(k)] + dual_[at(k)]);
       const Eigen::Vector3d by_moment = off.tail<3>() / square(kLever);
-      const Eigen::Vector3d force = moved_[at(k)].head<3>(), displaced = x_.col(k).head<3>();
-      by_acceleration += off.head<3>() + by_moment.cross(displaced);
-      step_.col(k).head<3>() -= dt * force.cross(by_moment);
+      by_acceleration += off.head<3>();
+      if (!isFlight(k)) {
+        const Eigen::Vector3d force = moved_[at(k)].head<3>(), displaced = x_.col(k).head<3>();
+        by_acceleration += by_moment.cross(displaced);
+        step_.col(k).head<3>() -= dt * force.cross(by_moment);
+      }
       if (!isLast(k)) step_.col(k).tail<3>() -= by_moment;
       if (k > 0) step_.col(k - 1).tail<3>() += by_moment;
     }
@@ -195,7 +211,7 @@ void CentroidalWindow::change() {
 void CentroidalWindow::project() {
   for (Index k = 0; k < frames_; ++k) {
     const Index frame = first_ + k;
-    if (problem_.free[frame]) {
+    if (differences_[at(k)].asked == 0.) {
       given_[at(k)] = moved_[at(k)];
       continue;
     }
@@ -240,7 +256,6 @@ void CentroidalWindow::adaptPenalty() {
   if (factor == 1.) return;
   penalty_ *= factor;
   for (Vector6& dual : dual_) dual /= factor;
-  factorize();
 }
 
 }  // namespace dynacom::internal

@@ -44,14 +44,16 @@ class CentroidalWindow {
   bool converged() const { return converged_; }
 
  private:
-  /// δ̈ = before δ₋ + here δ + after δ₊, over g; and how long a frame lasts.
+  /// δ̈ = before δ₋ + here δ + after δ₊, over g; how long a frame lasts; what the square of δ̈ costs;
+  /// and 1 where the wrench must be within reach, else 0.
   struct Difference {
-    double before, here, after, duration;
+    double before, here, after, duration, cost, asked;
   };
   using Vectors = std::vector<Vector6>;
 
   static std::size_t at(Eigen::Index k) { return static_cast<std::size_t>(k); }
   bool isLast(Eigen::Index k) const { return k + 1 == frames_; }
+  bool isFlight(Eigen::Index k) const;
   void discretize();
   Eigen::Vector3d acceleration(Eigen::Index k) const;
   Vector6 computeWrench(Eigen::Index k) const;

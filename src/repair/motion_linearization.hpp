@@ -27,8 +27,9 @@ struct LinearizedFrame {
   Eigen::Matrix<double, 6, 1> wrench;
   std::vector<Term> terms;  // of the frame and its neighbours, in order
   Eigen::Vector3d com;
-  Eigen::Matrix3Xd points;        // places in the world
-  std::vector<Eigen::Matrix3Xd> levers;  // derivatives of places − CoM, 3 × nv of each that is asked for
+  Eigen::Matrix3Xd points;  // places in the world
+  std::vector<Eigen::Matrix3Xd>
+      levers;  // derivatives of places − CoM, 3 × nv of each that is asked for
 };
 
 /// Linearizes motions whose velocities and accelerations are those of differentiate().

@@ -14,14 +14,21 @@ namespace dynacom::internal {
 using Eigen::Index;
 
 namespace {
-double env(const char* n, double d) { const char* s = getenv(n); return s ? atof(s) : d; }
+double env(const char* n, double d) {
+  const char* s = getenv(n);
+  return s ? atof(s) : d;
+}
 constexpr double kRelaxation = 1.6;
 double now() { return clock() / 1e6; }
 }  // namespace
 
 WholeBodyBalance::WholeBodyBalance(const pinocchio::Model& model, std::vector<BodyPoint> points,
                                    const BalanceProblem& problem, const BalanceCosts& costs)
-    : model_(model), problem_(problem), costs_(costs), linearizer_(model, std::move(points)), projection_(1.) {
+    : model_(model),
+      problem_(problem),
+      costs_(costs),
+      linearizer_(model, std::move(points)),
+      projection_(1.) {
   for (double mu : problem.mu) mu_.push_back(mu * (1. - costs.friction_margin));
 }
 
@@ -33,7 +40,8 @@ void WholeBodyBalance::linearize() {
     const std::uint32_t set = problem_.sets[k];
     if (set == 0) continue;
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    for (std::uint32_t rest = set; rest != 0; rest &= rest - 1) centre += frame.points.col(__builtin_ctz(rest));
+    for (std::uint32_t rest = set; rest != 0; rest &= rest - 1)
+      centre += frame.points.col(__builtin_ctz(rest));
     centre /= double(__builtin_popcount(set));
     for (std::uint32_t rest = set; rest != 0; rest &= rest - 1) {
       auto point = frame.points.col(__builtin_ctz(rest));
@@ -45,7 +53,9 @@ void WholeBodyBalance::linearize() {
     projection_.setAnswer(answers_[k]);
     projection_.project(frame.wrench, frame.points, mu_, set);
     answers_[k] = projection_.answer();
-    auto& here = std::find_if(frame.terms.begin(), frame.terms.end(), [&](const auto& t) { return t.frame == Index(k); })->derivative;
+    auto& here = std::find_if(frame.terms.begin(), frame.terms.end(), [&](const auto& t) {
+                   return t.frame == Index(k);
+                 })->derivative;
     for (std::uint32_t rest = set; rest != 0; rest &= rest - 1) {
       const int point = __builtin_ctz(rest);
       const Eigen::Vector3d f = projection_.force(point, mu_);
@@ -72,14 +82,17 @@ bool WholeBodyBalance::factorize(double penalty, bool cost) {
       for (int j = 0; j <= i; ++j) {
         const Index row = k - 1 + i, column = k - 1 + j;
         if (column < 0 || row >= n) continue;
-        system_(row, column).diagonal().array() += dt * differences_[std::size_t(k)][i] * differences_[std::size_t(k)][j] * costs_.acceleration.array().square().inverse();
+        system_(row, column).diagonal().array() += dt * differences_[std::size_t(k)][i] *
+                                                   differences_[std::size_t(k)][j] *
+                                                   costs_.acceleration.array().square().inverse();
       }
     if (problem_.free[k]) continue;
     const auto& terms = frames_[std::size_t(k)].terms;
     const double weight = dt * penalty * flightFactor(k);
     for (std::size_t i = 0; i < terms.size(); ++i)
       for (std::size_t j = 0; j <= i; ++j)
-        system_(terms[i].frame, terms[j].frame).noalias() += weight * terms[i].derivative.transpose() * terms[j].derivative;
+        system_(terms[i].frame, terms[j].frame).noalias() +=
+            weight * terms[i].derivative.transpose() * terms[j].derivative;
   }
   return system_.factorize();
 }
@@ -91,7 +104,8 @@ void WholeBodyBalance::iterate(bool cost) {
   for (Index k = 0; k < n; ++k) {
     const double dt = durations_[std::size_t(k)];
     if (cost) {
-      step_.col(k).array() -= dt * costs_.change.array().square().inverse() * change_.col(k).array();
+      step_.col(k).array() -=
+          dt * costs_.change.array().square().inverse() * change_.col(k).array();
       Eigen::VectorXd acc = differences_[std::size_t(k)][1] * change_.col(k);
       if (k > 0) acc += differences_[std::size_t(k)][0] * change_.col(k - 1);
       if (k + 1 < n) acc += differences_[std::size_t(k)][2] * change_.col(k + 1);
@@ -116,7 +130,10 @@ void WholeBodyBalance::iterate(bool cost) {
 void WholeBodyBalance::project(bool relax) {
   worst_ = 0.;
   for (Index k = 0; k < Index(frames_.size()); ++k) {
-    if (problem_.free[k]) { given_.col(k) = moved_.col(k); continue; }
+    if (problem_.free[k]) {
+      given_.col(k) = moved_.col(k);
+      continue;
+    }
     const double r = relax ? kRelaxation : 1.;
     const Vector6 target = r * moved_.col(k) + (1. - r) * given_.col(k) + dual_.col(k);
     dual_.col(k) = target;
@@ -145,11 +162,15 @@ void WholeBodyBalance::solve() {
   frames_.resize(std::size_t(n));
   q_ = problem_.q;
   change_.setZero(model_.nv, n);
-  given_.setZero(6, n); dual_.setZero(6, n); moved_.setZero(6, n);
+  given_.setZero(6, n);
+  dual_.setZero(6, n);
+  moved_.setZero(6, n);
   answers_.assign(std::size_t(n), {});
-  durations_.resize(std::size_t(n)); differences_.resize(std::size_t(n));
+  durations_.resize(std::size_t(n));
+  differences_.resize(std::size_t(n));
   for (Index k = 0; k < n; ++k) {
-    const double before = problem_.time[std::max<Index>(k, 1)] - problem_.time[std::max<Index>(k - 1, 0)];
+    const double before =
+        problem_.time[std::max<Index>(k, 1)] - problem_.time[std::max<Index>(k - 1, 0)];
     const double after = problem_.time[std::min(k + 1, n - 1)] - problem_.time[std::min(k, n - 2)];
     const double dt = 0.5 * (before + after);
     durations_[std::size_t(k)] = dt;
@@ -159,15 +180,22 @@ void WholeBodyBalance::solve() {
     d[1] = -d[0] - d[2];
   }
   static const double rho = env("RHO", 2000.), polish = env("POLISH", 100.);
-  static const int rounds = int(env("ROUNDS", 1)), its = int(env("ITS", 12)), polishes = int(env("POLISHES", 2)), pits = int(env("PITS", 4));
+  static const int rounds = int(env("ROUNDS", 1)), its = int(env("ITS", 12)),
+                   polishes = int(env("POLISHES", 2)), pits = int(env("PITS", 4));
   double t0 = now();
   for (int round = 0; round < rounds; ++round) {
     linearize();
     double t1 = now();
     for (Index k = 0; k < n; ++k) moved_.col(k) = frames_[std::size_t(k)].wrench;
-    if (round == 0) { given_ = moved_; project(false); }
+    if (round == 0) {
+      given_ = moved_;
+      project(false);
+    }
     double w0 = worst_;
-    if (!factorize(rho, true)) { fprintf(stderr, "not spd\n"); return; }
+    if (!factorize(rho, true)) {
+      fprintf(stderr, "not spd\n");
+      return;
+    }
     double t2 = now();
     for (int it = 0; it < its; ++it) {
       iterate(true);
@@ -176,7 +204,12 @@ void WholeBodyBalance::solve() {
     }
     double t3 = now();
     apply();
-    if (getenv("VERBOSE")) fprintf(stderr, "round %d linearize %.0f us/frame factor %.0f its %.1f each; worst %.2e -> %.2e (linear)\n", round, 1e6*(t1-t0)/n, 1e6*(t2-t1)/n, 1e6*(t3-t2)/n/its, w0, worst_);
+    if (getenv("VERBOSE"))
+      fprintf(stderr,
+              "round %d linearize %.0f us/frame factor %.0f its %.1f each; worst %.2e -> %.2e "
+              "(linear)\n",
+              round, 1e6 * (t1 - t0) / n, 1e6 * (t2 - t1) / n, 1e6 * (t3 - t2) / n / its, w0,
+              worst_);
     t0 = now();
   }
   for (int round = 0; round <= polishes; ++round) {
@@ -186,7 +219,16 @@ void WholeBodyBalance::solve() {
     given_ = moved_;
     project(false);
     dual_.setZero();
-    if (getenv("VERBOSE")) { Index w = 0, c = 0; double m = 0; for (Index k = 0; k < n; ++k) { double x = (moved_.col(k) - given_.col(k)).norm(); if (x > m) m = x, w = k; c += x > 1e-8; } fprintf(stderr, "polish %d true worst %.3e in frame %ld, %ld frames\n", round, m, w, c); }
+    if (getenv("VERBOSE")) {
+      Index w = 0, c = 0;
+      double m = 0;
+      for (Index k = 0; k < n; ++k) {
+        double x = (moved_.col(k) - given_.col(k)).norm();
+        if (x > m) m = x, w = k;
+        c += x > 1e-8;
+      }
+      fprintf(stderr, "polish %d true worst %.3e in frame %ld, %ld frames\n", round, m, w, c);
+    }
     if (round == polishes) break;
     if (!factorize(rho * polish, false)) return;
     for (int it = 0; it < pits; ++it) {

@@ -41,7 +41,9 @@ class WholeBodyBalance {
   void project(bool relax);
   void iterate(bool cost);
   void apply();
-  double flightFactor(Eigen::Index frame) const { return problem_.sets[std::size_t(frame)] ? 1. : 300.; }
+  double flightFactor(Eigen::Index frame) const {
+    return problem_.sets[std::size_t(frame)] ? 1. : 300.;
+  }
 
   const pinocchio::Model& model_;
   const BalanceProblem& problem_;
@@ -52,7 +54,7 @@ class WholeBodyBalance {
   std::vector<double> mu_;
   std::vector<double> durations_;
   std::vector<Eigen::Vector3d> differences_;  // second: before, here, after
-  Eigen::MatrixXd q_, change_, at_;  // at_: the change at which frames_ are linearised
+  Eigen::MatrixXd q_, change_, at_;           // at_: the change at which frames_ are linearised
   Eigen::MatrixXd step_;
   Matrix6X moved_, given_, dual_;
   std::vector<ConeProjection::Answer> answers_;
