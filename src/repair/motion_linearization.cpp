@@ -80,6 +80,7 @@ void MotionLinearizer::run(const Eigen::VectorXd& time, const Eigen::MatrixXd& q
     pinocchio::computeCentroidalDynamicsDerivatives(model_, data_, q.col(frame), v_, a_, dh_dq_,
                                                     by_q_, by_v_, by_a_);
     linear.com = data_.com[0];
+    linear.of_com = by_a_.topRows<3>() / mass;
     linear.wrench << data_.dhg.linear() - mass * model_.gravity.linear(), data_.dhg.angular();
     linear.wrench /= weight;
 
@@ -98,7 +99,7 @@ void MotionLinearizer::run(const Eigen::VectorXd& time, const Eigen::MatrixXd& q
 
     const std::uint32_t set = sets[static_cast<std::size_t>(frame)];
     linear.points.resize(3, Index(points_.size()));
-    linear.levers.resize(points_.size());
+    linear.places.resize(points_.size());
     pinocchio::JointIndex joint = 0;
     for (std::size_t k = 0; k < points_.size(); ++k) {
       const BodyPoint& point = points_[k];
@@ -112,8 +113,7 @@ void MotionLinearizer::run(const Eigen::VectorXd& time, const Eigen::MatrixXd& q
       }
       const Eigen::Vector3d arm =
           linear.points.col(Index(k)) - data_.oMi[point.joint].translation();
-      linear.levers[k] = jacobian_.topRows<3>() - skew(arm) * jacobian_.bottomRows<3>() -
-                         by_a_.topRows<3>() / mass;
+      linear.places[k] = jacobian_.topRows<3>() - skew(arm) * jacobian_.bottomRows<3>();
     }
   }
 }

@@ -28,8 +28,8 @@ struct LinearizedFrame {
   std::vector<Term> terms;  // of the frame and its neighbours, in order
   Eigen::Vector3d com;
   Eigen::Matrix3Xd points;  // places in the world
-  std::vector<Eigen::Matrix3Xd>
-      levers;  // derivatives of places − CoM, 3 × nv of each that is asked for
+  Eigen::Matrix3Xd of_com;        // derivative of the CoM, 3 × nv
+  std::vector<Eigen::Matrix3Xd> places;  // and of the points that it is asked for
 };
 
 /// Linearizes motions whose velocities and accelerations are those of differentiate().

@@ -33,7 +33,19 @@ WholeBodyBalance::WholeBodyBalance(const pinocchio::Model& model, std::vector<Bo
 }
 
 void WholeBodyBalance::linearize() {
-  linearizer_.run(problem_.time, q_, problem_.sets, frames_);
+  linearizer_.run(problem_.time, q_, problem_.held, frames_);
+  off_.assign(frames_.size(), Eigen::Matrix3Xd());
+  held_rms_ = 0.; held_worst_ = 0.; double count = 0;
+  for (std::size_t k = 0; k < frames_.size(); ++k) {
+    off_[k].setZero(3, Index(problem_.mu.size()));
+    for (std::uint32_t rest = problem_.held[k]; rest != 0; rest &= rest - 1) {
+      const int p = __builtin_ctz(rest);
+      off_[k].col(p) = frames_[k].points.col(p) - problem_.targets[std::size_t(p)].col(Index(k));
+      held_rms_ += off_[k].col(p).squaredNorm(); ++count;
+      held_worst_ = std::max(held_worst_, off_[k].col(p).norm());
+    }
+  }
+  if (count) held_rms_ = std::sqrt(held_rms_ / count);
   // Cones that are shrunk, and how levers change the moment.
   for (std::size_t k = 0; k < frames_.size(); ++k) {
     LinearizedFrame& frame = frames_[k];
@@ -61,7 +73,7 @@ void WholeBodyBalance::linearize() {
       const Eigen::Vector3d f = projection_.force(point, mu_);
       if (f.isZero(0.)) continue;
       for (Index c = 0; c < here.cols(); ++c)
-        here.col(c).tail<3>() += f.cross(Eigen::Vector3d(frame.levers[std::size_t(point)].col(c)));
+        here.col(c).tail<3>() += f.cross(Eigen::Vector3d(frame.places[std::size_t(point)].col(c) - frame.of_com.col(c)));
     }
   }
 }
@@ -86,6 +98,10 @@ bool WholeBodyBalance::factorize(double penalty, bool cost) {
                                                    differences_[std::size_t(k)][j] *
                                                    costs_.acceleration.array().square().inverse();
       }
+    for (std::uint32_t rest = problem_.held[std::size_t(k)]; rest != 0; rest &= rest - 1) {
+      const auto& J = frames_[std::size_t(k)].places[std::size_t(__builtin_ctz(rest))];
+      system_(k, k).noalias() += dt * problem_.hold * J.transpose() * J;
+    }
     if (problem_.free[k]) continue;
     const auto& terms = frames_[std::size_t(k)].terms;
     const double weight = dt * penalty * flightFactor(k);
@@ -114,6 +130,10 @@ void WholeBodyBalance::iterate(bool cost) {
       if (k > 0) step_.col(k - 1) -= differences_[std::size_t(k)][0] * acc;
       if (k + 1 < n) step_.col(k + 1) -= differences_[std::size_t(k)][2] * acc;
     }
+    for (std::uint32_t rest = problem_.held[std::size_t(k)]; rest != 0; rest &= rest - 1) {
+      const int p = __builtin_ctz(rest);
+      step_.col(k).noalias() -= dt * problem_.hold * frames_[std::size_t(k)].places[std::size_t(p)].transpose() * off_[std::size_t(k)].col(p);
+    }
     if (problem_.free[k]) continue;
     const double weight = dt * penalty_ * flightFactor(k);
     const Vector6 off = weight * (moved_.col(k) - given_.col(k) + dual_.col(k));
@@ -122,6 +142,11 @@ void WholeBodyBalance::iterate(bool cost) {
   }
   system_.solve(step_);
   change_ += step_;
+  for (Index k = 0; k < n; ++k)
+    for (std::uint32_t rest = problem_.held[std::size_t(k)]; rest != 0; rest &= rest - 1) {
+      const int p = __builtin_ctz(rest);
+      off_[std::size_t(k)].col(p).noalias() += frames_[std::size_t(k)].places[std::size_t(p)] * step_.col(k);
+    }
   for (Index k = 0; k < n; ++k)
     for (const auto& term : frames_[std::size_t(k)].terms)
       moved_.col(k).noalias() += term.derivative * step_.col(term.frame);
@@ -227,7 +252,7 @@ void WholeBodyBalance::solve() {
         if (x > m) m = x, w = k;
         c += x > 1e-8;
       }
-      fprintf(stderr, "polish %d true worst %.3e in frame %ld, %ld frames\n", round, m, w, c);
+      fprintf(stderr, "polish %d true worst %.3e in frame %ld, %ld frames; held rms %.3f worst %.3f mm\n", round, m, w, c, 1e3*held_rms_, 1e3*held_worst_);
     }
     if (round == polishes) break;
     if (!factorize(rho * polish, false)) return;

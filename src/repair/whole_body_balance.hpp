@@ -17,6 +17,9 @@ struct BalanceProblem {
   std::vector<double> mu;
   std::vector<std::uint32_t> sets;
   Eigen::Array<bool, Eigen::Dynamic, 1> free;
+  std::vector<std::uint32_t> held;       // points that are to be at their targets, at least those of sets
+  std::vector<Eigen::Matrix3Xd> targets; // of each point 3 × frames
+  double hold = 0.;                      // cost of the square of what they are off
 };
 
 struct BalanceCosts {
@@ -33,6 +36,8 @@ class WholeBodyBalance {
   const Eigen::MatrixXd& q() const { return q_; }
   const Eigen::MatrixXd& change() const { return change_; }
   double worst() const { return worst_; }
+  double heldRms() const { return held_rms_; }
+  double heldWorst() const { return held_worst_; }
 
  private:
   using Matrix6X = Eigen::Matrix<double, 6, Eigen::Dynamic>;
@@ -61,6 +66,8 @@ class WholeBodyBalance {
   double penalty_ = 0.;
   BlockBand<Eigen::Dynamic> system_;
   double worst_ = 0.;
+  std::vector<Eigen::Matrix3Xd> off_;
+  double held_rms_ = 0., held_worst_ = 0.;
 };
 
 }  // namespace dynacom::internal
