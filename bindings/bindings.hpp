@@ -34,6 +34,8 @@ void exposeCentroidalFilter();
 void exposeRecordedMotion();
 void exposeMotionAnalysis();
 void exposeMotionVerdict();
+void exposeMissingSupport();
+void exposeTerrain();
 void exposeMotionStatistics();
 void exposeMotionExamination();
 

@@ -105,7 +105,8 @@ std::string writePartRobot(const PartRobot& split) {
 std::string writeStance(const Stance& stance) {
   return internal::concat("Stance(part=", stance.part, ", first=", stance.first,
                           ", behind=", stance.behind, ", height=", stance.height,
-                          ", on_ground=", stance.on_ground ? "True" : "False", ")");
+                          ", on_ground=", stance.on_ground ? "True" : "False", ", slope=(",
+                          stance.slope.x(), ", ", stance.slope.y(), "))");
 }
 
 bp::list getStances(const ContactInference& found) { return toList(found.stances); }
@@ -193,6 +194,15 @@ void exposeContactInference() {
       .def_readonly("behind", &Stance::behind, "The frame after the last")
       .def_readonly("height", &Stance::height, "Of the part's lowest point there [m]")
       .def_readonly("on_ground", &Stance::on_ground, "Whether the ground may carry it there")
+      .def_readonly("begin", &Stance::begin,
+                    "The first frame that belongs to it: with those of the way here, since the\n"
+                    "part was fastest")
+      .def_readonly("end", &Stance::end,
+                    "The frame after the last that belongs to it: with those of the way to the\n"
+                    "next, until the part is fastest")
+      .add_property("slope", getter(&Stance::slope),
+                    "The ground's gradient (dz/dx, dz/dy) there, (2,); zero where it is level or\n"
+                    "not known, or where the part is never active")
       .def(PrintVisitor<Stance>(&writeStance))
       .def(CopyVisitor<Stance>());
 
@@ -210,8 +220,8 @@ void exposeContactInference() {
                     "frames x 2: the norms of the force [m g] and of the moment about the\n"
                     "CoM [m g m].")
       .add_property("slope", getter(&ContactInference::slope),
-                    "The ground's gradient (dz/dx, dz/dy), (2,), where all stances of contacts\n"
-                    "lie in one plane that is not level; else zero")
+                    "The slope that all stances share in which a contact's part is active, (2,);\n"
+                    "zero where there is no such one")
       .add_property("ground_velocity", getter(&ContactInference::ground_velocity),
                     "As given or found, (3,) [m/s]")
       .def(PrintVisitor<ContactInference>(&writeInference))

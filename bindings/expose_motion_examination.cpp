@@ -18,6 +18,10 @@ bp::object getInferred(const Examination& examination) {
   return examination.inferred ? bp::object(*examination.inferred) : bp::object();
 }
 
+bp::object getMissingSupport(const Examination& examination) {
+  return examination.missing_support ? bp::object(*examination.missing_support) : bp::object();
+}
+
 bp::list getSeats(const Examination& examination) { return toList(examination.seats); }
 
 std::shared_ptr<Seat> makeSeat(const std::string& link, Eigen::Index first, Eigen::Index behind,
@@ -118,12 +122,18 @@ void exposeMotionExamination() {
       .def_readonly("schedule", &Examination::schedule, "The ContactSchedule of the contacts")
       .add_property("inferred", &getInferred,
                     "What inference finds on its own, where contacts were recorded; else None")
+      .add_property("disagreement", getter(&Examination::disagreement),
+                    "In which share of the frames each contact is otherwise there, (C,); (0,)\n"
+                    "where contacts were not recorded")
+      .def_readonly("terrain", &Examination::terrain, "The Terrain")
       .def_readonly("bodies", &Examination::bodies,
                     "The ContactSchedule of the links that carry at some time, by name")
       .add_property("seats", &getSeats,
                     "A Seat for each time in which a link may rest on what nothing is known of")
       .def_readonly("analysis", &Examination::analysis, "The MotionAnalysis")
       .def_readonly("verdict", &Examination::verdict, "The MotionVerdict")
+      .add_property("missing_support", &getMissingSupport,
+                    "The MissingSupport, or None where nothing is missing or can be said")
       .def_readonly("statistics", &Examination::statistics, "The MotionStatistics")
       .add_property("sensitivity", &getSensitivity,
                     "A CutoffSensitivity for half, and for twice the cut-off")
@@ -135,9 +145,10 @@ void exposeMotionExamination() {
       "MotionExaminer",
       "Judges recorded motions of one robot, a DynaCoM, which is copied: deriveMotion,\n"
       "computeContactMotions, inferContacts for the contacts' parts, analyzeMotion, gatherParts,\n"
-      "judgeMotion and summarizeMotion, one after the other. The ground that the centre of\n"
-      "pressure lies on is the mean of those that are stood on. Threads, solvers and storage are\n"
-      "kept from one motion to the next.",
+      "findTerrain, judgeMotion, findMissingSupport and summarizeMotion, one after the other. The\n"
+      "ground that the centre of pressure lies on is the mean of those that are stood on. "
+      "Threads,\n"
+      "solvers and storage are kept from one motion to the next.",
       bp::no_init)
       .def("__init__",
            bp::make_constructor(

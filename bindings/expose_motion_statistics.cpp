@@ -16,6 +16,8 @@ bp::dict getStatuses(const Statistics& statistics) {
 
 bp::list getContacts(const Statistics& statistics) { return toList(statistics.contacts); }
 
+bp::list getBodies(const Statistics& statistics) { return toList(statistics.bodies); }
+
 std::string writeStatistics(const Statistics& statistics) {
   return internal::concat("MotionStatistics(frames=", statistics.frames,
                           ", mean_vertical_force=", statistics.mean_vertical_force,
@@ -27,6 +29,17 @@ std::string writeContact(const ContactStatistics& contact) {
   return internal::concat("ContactStatistics(name='", contact.name,
                           "', active_share=", contact.active_share,
                           ", weight_share=", contact.weight_share, ")");
+}
+
+std::shared_ptr<BodyStatistics> makeBody(const std::string& link, double active_share,
+                                         double weight_share, double largest_vertical_force) {
+  return std::make_shared<BodyStatistics>(
+      BodyStatistics{link, active_share, weight_share, largest_vertical_force});
+}
+
+std::string writeBody(const BodyStatistics& body) {
+  return internal::concat("BodyStatistics(link='", body.link, "', active_share=", body.active_share,
+                          ", weight_share=", body.weight_share, ")");
 }
 
 std::string writeDifference(const MeasuredDifference& difference) {
@@ -62,6 +75,23 @@ void exposeMotionStatistics() {
       .def(PrintVisitor<ContactStatistics>(&writeContact))
       .def(CopyVisitor<ContactStatistics>());
 
+  bp::class_<BodyStatistics, std::shared_ptr<BodyStatistics>>(
+      "BodyStatistics",
+      "What a link does in a motion as a whole that touches something "
+      "besides the\ncontacts. Forces are parts of the weight m g.",
+      bp::no_init)
+      .def("__init__",
+           bp::make_constructor(&makeBody, bp::default_call_policies(),
+                                (bp::arg("link"), bp::arg("active_share"), bp::arg("weight_share"),
+                                 bp::arg("largest_vertical_force"))))
+      .def_readonly("link", &BodyStatistics::link, "Its name")
+      .def_readonly("active_share", &BodyStatistics::active_share, "Of the frames")
+      .def_readonly("weight_share", &BodyStatistics::weight_share,
+                    "Mean of its vertical force [m g]")
+      .def_readonly("largest_vertical_force", &BodyStatistics::largest_vertical_force, "[m g]")
+      .def(PrintVisitor<BodyStatistics>(&writeBody))
+      .def(CopyVisitor<BodyStatistics>());
+
   bp::class_<Statistics>("MotionStatistics",
                          "A motion in a few numbers. Forces are parts of the weight m g, moments\n"
                          "of m g times a metre, unless they say otherwise.",
@@ -84,6 +114,16 @@ void exposeMotionStatistics() {
                     "accelerations are known, (6,): forward, left and up, as the free-flyer's\n"
                     "heading has it")
       .add_property("contacts", &getContacts, "A ContactStatistics for each contact")
+      .add_property("bodies", &getBodies,
+                    "A BodyStatistics for each link that touches something besides these")
+      .def_readonly("bodies_active_share", &Statistics::bodies_active_share,
+                    "Of the frames, in which any of these links is active")
+      .def_readonly("bodies_weight_share_while_active",
+                    &Statistics::bodies_weight_share_while_active,
+                    "Mean over these frames of the vertical force of all of them [m g]")
+      .def("mayBeLoad", &Statistics::mayBeLoad, bp::arg("self"),
+           "Whether the mean residual may be that of a load which nobody has told of: it is large\n"
+           "enough, and much the same all the time.")
       .def("share", &Statistics::share, (bp::arg("self"), bp::arg("status")),
            "Which part of the frames has a DistributionStatus.")
       .def(PrintVisitor<Statistics>(&writeStatistics))

@@ -183,6 +183,10 @@ void exposeMotionVerdict() {
                     "Frames whose accelerations are not known, (T,) of bool: those given, and\n"
                     "those near jumps")
       .add_property("windows", &getWindows, "A MotionWindow for each")
+      .add_property(
+          "severity", &MotionVerdict::getSeverity,
+          "The largest share of frames beyond the limit of a fault that holds; 0 if none\n"
+          "does")
       .def_readonly("feasible_share", &MotionVerdict::feasible_share,
                     "Of the frames, that are in windows")
       .add_property("normals", &getNormals, "A ContactNormal for each contact")

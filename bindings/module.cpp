@@ -44,6 +44,8 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeContactInference();
   exposeCentroidalFilter();
   exposeMotionVerdict();
+  exposeMissingSupport();
+  exposeTerrain();
   exposeMotionStatistics();
   exposeMotionExamination();
 }

@@ -9,6 +9,7 @@
 
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
+#include "standard_gravity.hpp"
 #ifdef DYNACOM_HAS_LANES
 #include <dlfcn.h>
 #endif
@@ -272,6 +273,7 @@ std::optional<LaneCarrier> LaneCarrier::make(const Carrier& carrier, int lanes) 
   made.carrier_.mass = carrier.mass;
   Vector3::Map(made.carrier_.gravity) = carrier.gravity;
   Vector6::Map(made.carrier_.wrench_weights) = carrier.wrench_weights;
+  made.carrier_.minimal_scale = carrier.mass * kStandardGravity;
   made.carrier_.minimal_vertical_force = carrier.minimal_vertical_force;
   return made;
 }
@@ -293,7 +295,7 @@ LaneDistributor::LaneDistributor(const LaneCarrier& carrier, double ground_heigh
 void LaneDistributor::run(Eigen::Index first, Eigen::Index frames,
                           const std::vector<ContactMotion>& contacts,
                           const Eigen::MatrixXd& readiness, MotionAnalysis& result) {
-  answered_.resize(frames);
+  answers_.resize(static_cast<std::size_t>(frames));
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     MotionAnalysis::Contact& contact = result.contacts[k];
     lanes::ContactRows& rows = rows_[k];
@@ -319,8 +321,20 @@ void LaneDistributor::run(Eigen::Index first, Eigen::Index frames,
   distributions.feasible_dam = columnOf(result.feasible_dam, first);
   distributions.residual = columnOf(result.residual, first);
   distributions.contacts = rows_.data();
-  distributions.answered = answered_.data();
+  distributions.answers = answers_.data();
   interface_.distribute(worker_.get(), &distributions);
+}
+
+std::optional<DistributionStatus> LaneDistributor::status(Eigen::Index frame) const {
+  switch (answers_[static_cast<std::size_t>(frame)]) {
+    case lanes::Answer::Solved:
+      return DistributionStatus::Solved;
+    case lanes::Answer::Relaxed:
+      return DistributionStatus::Relaxed;
+    case lanes::Answer::None:
+      break;
+  }
+  return std::nullopt;
 }
 
 }  // namespace dynacom::internal

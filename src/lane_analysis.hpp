@@ -76,7 +76,7 @@ class LaneCarrier {
   std::vector<bool> is_aligned_;
 };
 
-/// How contacts share what a motion needs, as long as no inequality is active.
+/// How contacts share what a motion needs, in frames that prove their answers in lanes.
 class LaneDistributor {
  public:
   /// @param ground_height           for the centre of pressure on flat ground [m]
@@ -90,15 +90,15 @@ class LaneDistributor {
   void run(Eigen::Index first, Eigen::Index frames, const std::vector<ContactMotion>& contacts,
            const Eigen::MatrixXd& readiness, MotionAnalysis& result);
 
-  /// Whether a frame of the last run(), counted from its first, has its answer.
-  bool isAnswered(Eigen::Index frame) const { return answered_[frame]; }
+  /// The answer of a frame of the last run(), counted from its first; nothing where it is left.
+  std::optional<DistributionStatus> status(Eigen::Index frame) const;
 
  private:
   const lanes::Interface& interface_;
   std::unique_ptr<void, void (*)(void*)> worker_;
   std::vector<lanes::ContactRows> rows_;
   const std::vector<bool>& is_aligned_;
-  Eigen::Array<bool, Eigen::Dynamic, 1> answered_;
+  std::vector<lanes::Answer> answers_;
 };
 
 }  // namespace dynacom::internal

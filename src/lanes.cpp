@@ -2,195 +2,25 @@
 #include "lanes.hpp"
 
 #include <algorithm>
-#include <experimental/simd>
-#include <limits>
 #include <new>
 #include <vector>
+
+#include "lane_math.hpp"
+#include "lane_newton.hpp"
 
 namespace dynacom::lanes {
 namespace {
 
-namespace stdx = std::experimental;
-
-// A number of each frame, and whether something is so in each.
-using Lanes = stdx::native_simd<double>;
-using Mask = Lanes::mask_type;
-constexpr int kLanes = static_cast<int>(Lanes::size());
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // By how much a quaternion's squared norm may differ from 1: more, and algorithms differ.
 constexpr double kNormalized = 1e-12;
 // From which angle on sine and cosine of stdx overflow [rad].
 constexpr double kLargestAngle = 1e9;
-// What part of the largest pivot the least must be, so that the contacts give all wrenches.
-constexpr double kFullRank = 1e-6;
-// What part of the wrench an answer may lack.
-constexpr double kMissing = 1e-12;
-
-// Vectors and matrices in three dimensions, the latter by their columns.
-struct Vector {
-  Lanes x, y, z;
-};
-struct Matrix {
-  Vector x, y, z;
-};
-
-inline Vector operator+(const Vector& a, const Vector& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-inline Vector operator-(const Vector& a, const Vector& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-inline Vector operator*(const Lanes& s, const Vector& a) { return {s * a.x, s * a.y, s * a.z}; }
-inline Vector& operator+=(Vector& a, const Vector& b) { return a = a + b; }
-inline Lanes dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vector cross(const Vector& a, const Vector& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-inline Vector operator*(const Matrix& m, const Vector& a) {
-  return a.x * m.x + a.y * m.y + a.z * m.z;
-}
-inline Matrix operator*(const Matrix& m, const Matrix& n) { return {m * n.x, m * n.y, m * n.z}; }
-inline Vector transposed(const Matrix& m, const Vector& a) {
-  return {dot(m.x, a), dot(m.y, a), dot(m.z, a)};
-}
-inline Vector broadcast(const double* a) { return {a[0], a[1], a[2]}; }
-inline Matrix broadcastMatrix(const double* m) {
-  return {broadcast(m), broadcast(m + 3), broadcast(m + 6)};
-}
-inline Vector zero() { return {0., 0., 0.}; }
-inline Matrix identity() { return {{1., 0., 0.}, {0., 1., 0.}, {0., 0., 1.}}; }
-
-// As Eigen has it.
-inline Matrix rotationOf(const Lanes& x, const Lanes& y, const Lanes& z, const Lanes& w) {
-  const Lanes tx = 2. * x, ty = 2. * y, tz = 2. * z;
-  const Lanes xx = tx * x, xy = tx * y, xz = tx * z, yy = ty * y, yz = ty * z, zz = tz * z;
-  const Lanes wx = tx * w, wy = ty * w, wz = tz * w;
-  return {{1. - (yy + zz), xy + wz, xz - wy},
-          {xy - wz, 1. - (xx + zz), yz + wx},
-          {xz + wy, yz - wx, 1. - (xx + yy)}};
-}
-
-// The quaternion (x, y, z, w), as Eigen has it: by its largest component, or by w where the trace
-// is positive.
-inline void findQuaternion(const Matrix& m, Lanes (&quaternion)[4]) {
-  const Lanes xx = m.x.x, yy = m.y.y, zz = m.z.z;
-  const Lanes trace = xx + yy + zz;
-  // Four times the product of each component with the one that is chosen.
-  Lanes square = 1. + trace;
-  Lanes x = m.y.z - m.z.y, y = m.z.x - m.x.z, z = m.x.y - m.y.x, w = square;
-  const auto choose = [&](const Mask& mask, const Lanes& chosen, const Lanes& with_x,
-                          const Lanes& with_y, const Lanes& with_z, const Lanes& with_w) {
-    stdx::where(mask, square) = chosen;
-    stdx::where(mask, x) = with_x;
-    stdx::where(mask, y) = with_y;
-    stdx::where(mask, z) = with_z;
-    stdx::where(mask, w) = with_w;
-  };
-  const Lanes xy = m.x.y + m.y.x, xz = m.x.z + m.z.x, yz = m.y.z + m.z.y;
-  const Lanes from_x = x, from_y = y, from_z = z;
-  const Mask other = !(trace > 0.);
-  const Mask by_y = other && yy > xx && yy >= zz, by_z = other && zz > xx && zz > yy;
-  const Mask by_x = other && !by_y && !by_z;
-  const Lanes square_x = 1. + xx - yy - zz, square_y = 1. + yy - zz - xx,
-              square_z = 1. + zz - xx - yy;
-  choose(by_x, square_x, square_x, xy, xz, from_x);
-  choose(by_y, square_y, xy, square_y, yz, from_y);
-  choose(by_z, square_z, xz, yz, square_z, from_z);
-  const Lanes scale = 0.5 / stdx::sqrt(square);
-  quaternion[0] = scale * x;
-  quaternion[1] = scale * y;
-  quaternion[2] = scale * z;
-  quaternion[3] = scale * w;
-}
 
 // How a joint's frame moves, in the world's axes: velocity and acceleration are those of its origin
 // as a point.
 struct Moving {
   Matrix rotation;
   Vector position, angular_velocity, velocity, angular_acceleration, acceleration;
-};
-
-// L D Lᵀ of a symmetric 6 × 6 matrix, in place: L below the diagonal, 1/D on it.
-struct Factors {
-  Lanes m[6][6];
-  Lanes least_pivot, largest_pivot;
-
-  void compute() {
-    for (int j = 0; j < 6; ++j) {
-      const Lanes pivot = m[j][j];
-      least_pivot = j == 0 ? pivot : stdx::min(least_pivot, pivot);
-      largest_pivot = j == 0 ? pivot : stdx::max(largest_pivot, pivot);
-      const Lanes inverse = 1. / pivot;
-      m[j][j] = inverse;
-      Lanes column[6];
-      for (int i = j + 1; i < 6; ++i) {
-        column[i] = m[i][j];
-        m[i][j] *= inverse;
-      }
-      for (int i = j + 1; i < 6; ++i)
-        for (int k = j + 1; k <= i; ++k) m[i][k] -= m[i][j] * column[k];
-    }
-  }
-
-  void solve(Lanes* x) const {
-    for (int j = 0; j < 6; ++j)
-      for (int i = j + 1; i < 6; ++i) x[i] -= m[i][j] * x[j];
-    for (int j = 0; j < 6; ++j) x[j] *= m[j][j];
-    for (int j = 5; j > 0; --j)
-      for (int i = 0; i < j; ++i) x[i] -= m[j][i] * x[j];
-  }
-};
-
-// The frames at hand: as many as there are lanes, or those that are left.
-class Block {
- protected:
-  void take(std::ptrdiff_t first, std::ptrdiff_t count) {
-    first_ = first;
-    count_ = static_cast<int>(std::min<std::ptrdiff_t>(kLanes, count - first));
-  }
-  // Lanes that are too many do what the last one does.
-  std::ptrdiff_t frameOf(int lane) const { return first_ + std::min(lane, count_ - 1); }
-
-  // Reads columns.
-  template <int kRows>
-  void load(const double* columns, Lanes (&values)[kRows]) const {
-    for (int row = 0; row < kRows; ++row)
-      values[row] = Lanes([&](auto lane) { return columns[frameOf(lane) * kRows + row]; });
-  }
-  Vector loadVector(const double* columns) const {
-    Lanes values[3];
-    load(columns, values);
-    return {values[0], values[1], values[2]};
-  }
-
-  template <int kRows>
-  void store(double* columns, const Lanes (&values)[kRows]) const {
-    double buffer[kRows][kLanes];
-    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
-    double* column = columns + first_ * kRows;
-    for (int lane = 0; lane < count_; ++lane, column += kRows)
-      for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
-  }
-  void store(double* columns, const Vector& values) const {
-    store(columns, {values.x, values.y, values.z});
-  }
-  // The same, where something is so.
-  template <int kRows>
-  void storeWhere(const Mask& mask, double* columns, const Lanes (&values)[kRows]) const {
-    double buffer[kRows][kLanes];
-    for (int row = 0; row < kRows; ++row) values[row].copy_to(buffer[row], stdx::element_aligned);
-    double* column = columns + first_ * kRows;
-    for (int lane = 0; lane < count_; ++lane, column += kRows)
-      if (mask[lane])
-        for (int row = 0; row < kRows; ++row) column[row] = buffer[row][lane];
-  }
-  void store(bool* values, const Mask& mask) const {
-    for (int lane = 0; lane < count_; ++lane) values[first_ + lane] = mask[lane];
-  }
-
-  std::ptrdiff_t first_ = 0;
-  int count_ = 0;
 };
 
 // ---- What a motion needs, and how its contacts lie and move ----
@@ -469,26 +299,34 @@ class Distributor : Block {
   explicit Distributor(const Carrier& carrier)
       : carrier_(carrier),
         contacts_(carrier.contact, carrier.contact + carrier.contacts),
-        standing_(contacts_.size()) {}
+        standing_(contacts_.size()),
+        newton_(contacts_) {
+    const double* D = carrier.wrench_weights;
+    spread_ = *std::max_element(D, D + 6) / *std::min_element(D, D + 6);
+    minimal_scale_ = carrier.minimal_scale * *std::max_element(D, D + 3);
+    for (const Contact& contact : contacts_)
+      largest_weight_ = std::max(
+          largest_weight_, *std::max_element(contact.weights, contact.weights + contact.size));
+  }
 
+  // First the forces that no inequality holds back. Frames without an answer are gathered, so that
+  // none waits for others that have theirs.
   void run(const Distributions& distributions) {
+    left_.clear();
     for (std::ptrdiff_t first = 0; first < distributions.count; first += kLanes) {
       take(first, distributions.count);
-      com_ = loadVector(distributions.com);
-      force_ = loadVector(distributions.force);
-      torque_ = loadVector(distributions.torque);
-      const Lanes wrench[6] = {force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z};
-      for (int i = 0; i < 6; ++i) wrench_[i] = wrench[i];
-      bool any = false;
-      for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        stand(distributions.contacts[k], standing_[k]);
-        any = any || standing_[k].takes_part;
-      }
+      takeProblem(distributions);
       if (carrier_.flat_horizontal_ground) findCentreOfPressure(distributions);
-      if (any)
-        distribute(distributions);
-      else
-        store(distributions.answered, Mask(false));
+      write(distributions, newton_.solveFreely(target_));
+    }
+    for (int attempt = 0; attempt < DualNewton::kAttempts; ++attempt) {
+      candidates_.swap(left_);
+      left_.clear();
+      for (std::size_t first = 0; first < candidates_.size(); first += kLanes) {
+        take(candidates_, static_cast<std::ptrdiff_t>(first));
+        takeProblem(distributions);
+        write(distributions, newton_.solve(target_, spread_, attempt));
+      }
     }
   }
 
@@ -500,27 +338,80 @@ class Distributor : Block {
     Matrix rotation;  // of its surface
     Vector lever;     // from the CoM to the surface's origin
     Vector moments[3];
+    Lanes inverse_weights[6];  // W⁻¹ times the unit of force
     Lanes force[6];
   };
 
+  void takeProblem(const Distributions& distributions);
   void stand(const ContactRows& rows, Standing& standing) const;
+  void scaleProblem();
   void findCentreOfPressure(const Distributions& distributions) const;
-  Mask findForces();
-  void distribute(const Distributions& distributions);
-  void storeContact(const Distributions& distributions, std::size_t k, const Mask& answered) const;
+  void takeForces();
+  void write(const Distributions& distributions, const Mask& answered);
+  void writeMeanPressure(const Distributions& distributions, const Mask& answered) const;
+  void writeContact(const Distributions& distributions, std::size_t k, const Mask& answered) const;
 
   const Carrier carrier_;
   const std::vector<Contact> contacts_;
+  double spread_;                   // the largest wrench weight over the least
+  double minimal_scale_;            // of weighted wrenches
+  double largest_weight_ = 0.;      // of all contacts
   std::vector<Standing> standing_;  // by contact
+  DualNewton newton_;
+  std::vector<std::ptrdiff_t> left_, candidates_;  // frames without an answer, now and before
 
   // Of the frames at hand.
   Vector com_, force_, torque_;
-  Lanes wrench_[6], achieved_[6];
+  Wrench wrench_, achieved_;
+  Mask is_carried_;       // by any contact
+  Wrench target_, unit_;  // D w over its unit, and that
 };
+
+void Distributor::takeProblem(const Distributions& distributions) {
+  com_ = loadVector(distributions.com);
+  force_ = loadVector(distributions.force);
+  torque_ = loadVector(distributions.torque);
+  wrench_ = {{force_.x, force_.y, force_.z, torque_.x, torque_.y, torque_.z}};
+  is_carried_ = Mask(false);
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    stand(distributions.contacts[k], standing_[k]);
+    if (standing_[k].takes_part) is_carried_ = is_carried_ || standing_[k].is_active > 0.;
+  }
+  scaleProblem();
+}
+
+// Gives Newton's method the problem over its units, as WrenchDistribution has them.
+void Distributor::scaleProblem() {
+  const double* D = carrier_.wrench_weights;
+  for (int i = 0; i < 6; ++i) target_[i] = D[i] * wrench_[i];
+  const Lanes size = norm(target_);
+  const Lanes scale = stdx::max(size, Lanes(minimal_scale_)), inverse_scale = 1. / scale;
+  for (int i = 0; i < 6; ++i) {
+    target_[i] *= inverse_scale;
+    unit_[i] = scale / D[i];
+  }
+  const Lanes inverse_overall_weight = norm(wrench_) / size;
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    Standing& standing = standing_[k];
+    Cone& cone = newton_.cones()[k];
+    cone.is_there = standing.takes_part;
+    if (!standing.takes_part) continue;
+    const Vector axes[3] = {standing.rotation.x, standing.rotation.y, standing.rotation.z};
+    const Lanes ease = stdx::sqrt(standing.is_active) * inverse_overall_weight;
+    for (int i = 0; i < cone.size; ++i) {
+      const Lanes inverse_weight = ease * (largest_weight_ / contacts_[k].weights[i]);
+      standing.inverse_weights[i] = scale * inverse_weight;
+      const Vector force = i < 3 ? axes[i] : zero();
+      const Vector moment = i < 3 ? standing.moments[i] : axes[i - 3];
+      cone.e[i] = {{force.x, force.y, force.z, moment.x, moment.y, moment.z}};
+      for (int j = 0; j < 6; ++j) cone.e[i][j] *= D[j] * inverse_weight;
+    }
+  }
+}
 
 void Distributor::stand(const ContactRows& rows, Standing& standing) const {
   bool any = false;
-  for (int lane = 0; lane < count_; ++lane) any = any || rows.active[first_ + lane];
+  for (int lane = 0; lane < count_; ++lane) any = any || rows.active[frameOf(lane)];
   standing.takes_part = any;
   if (!any) return;
   standing.is_active = Lanes([&](auto lane) {
@@ -551,114 +442,45 @@ void Distributor::findCentreOfPressure(const Distributions& distributions) const
   store(distributions.cop, {x, y});
 }
 
-// The cheapest forces that give the wrench, whatever inequalities say: the multipliers ν solve
-// NE W⁻² NEᵀ ν = w, and λ = W⁻² NEᵀ ν. Says where all inequalities hold.
-Mask Distributor::findForces() {
-  const double* D = carrier_.wrench_weights;
-  Factors factors;
-  Lanes compliance[6][6];
-  for (auto& row : compliance)
-    for (Lanes& number : row) number = 0.;
-  // Components whose bound is zero have no force.
-  const auto isFree = [](const Contact& contact, int i) { return i == 2 || contact.betas[i] > 0.; };
-  const auto add = [&](const Lanes& scale, const Lanes* column, int first) {
-    for (int j = first; j < 6; ++j) {
-      const Lanes scaled = scale * column[j];
-      for (int i = j; i < 6; ++i) compliance[i][j] += scaled * column[i];
-    }
-  };
+// Takes over what Newton's method has found.
+void Distributor::takeForces() {
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    const Contact& contact = contacts_[k];
-    const Standing& standing = standing_[k];
-    if (!standing.takes_part) continue;
-    const Vector* axes[3] = {&standing.rotation.x, &standing.rotation.y, &standing.rotation.z};
-    for (int i = 0; i < contact.size; ++i) {
-      if (!isFree(contact, i)) continue;
-      const Vector& axis = *axes[i % 3];
-      const Lanes scale = standing.is_active / (contact.weights[i] * contact.weights[i]);
-      if (i < 3) {
-        const Vector& moment = standing.moments[i];
-        const Lanes column[6] = {axis.x, axis.y, axis.z, moment.x, moment.y, moment.z};
-        add(scale, column, 0);
-      } else {
-        const Lanes column[6] = {0., 0., 0., axis.x, axis.y, axis.z};
-        add(scale, column, 3);
-      }
-    }
-  }
-  for (int j = 0; j < 6; ++j)
-    for (int i = j; i < 6; ++i) factors.m[i][j] = compliance[i][j] *= D[i] * D[j];
-  factors.compute();
-  Mask answered = factors.least_pivot > kFullRank * factors.largest_pivot;
-
-  Lanes multipliers[6], missing[6], size = 0.;
-  for (int i = 0; i < 6; ++i) {
-    missing[i] = D[i] * wrench_[i];
-    multipliers[i] = missing[i];
-    size += missing[i] * missing[i];
-  }
-  factors.solve(multipliers);
-  for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j)
-      missing[i] -= compliance[std::max(i, j)][std::min(i, j)] * multipliers[j];
-  factors.solve(missing);
-  for (int i = 0; i < 6; ++i) multipliers[i] = D[i] * (multipliers[i] + missing[i]);
-
-  const Vector of_force = {multipliers[0], multipliers[1], multipliers[2]};
-  const Vector of_moment = {multipliers[3], multipliers[4], multipliers[5]};
-  Vector force = zero(), moment = zero();
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    const Contact& contact = contacts_[k];
     Standing& standing = standing_[k];
-    if (!standing.takes_part) continue;
-    const Matrix& R = standing.rotation;
-    const Vector pull = transposed(R, of_force), turn = transposed(R, of_moment);
-    const Lanes pulls[6] = {pull.x + dot(standing.moments[0], of_moment),
-                            pull.y + dot(standing.moments[1], of_moment),
-                            pull.z + dot(standing.moments[2], of_moment),
-                            turn.x,
-                            turn.y,
-                            turn.z};
-    for (int i = 0; i < 6; ++i) {
-      const bool free = i < contact.size && isFree(contact, i);
-      const double weight = contact.weights[i];
-      standing.force[i] = free ? standing.is_active * pulls[i] / (weight * weight) : Lanes(0.);
-    }
-    const Lanes* f = standing.force;
-    const Vector own = R * Vector{f[0], f[1], f[2]};
-    force += own;
-    moment += cross(standing.lever, own) + R * Vector{f[3], f[4], f[5]};
-    Mask inside = f[2] > 0.;
-    for (int i = 0; i < contact.size; ++i)
-      if (i != 2) inside = inside && stdx::abs(f[i]) <= contact.betas[i] * f[2];
-    answered = answered && (inside || standing.is_active == 0.);
+    const Cone& cone = newton_.cones()[k];
+    if (!cone.is_there) continue;
+    for (int i = 0; i < 6; ++i)
+      standing.force[i] = i < cone.size ? standing.inverse_weights[i] * cone.force[i] : Lanes(0.);
   }
-  const Lanes achieved[6] = {force.x, force.y, force.z, moment.x, moment.y, moment.z};
-  Lanes distance = 0.;
-  for (int i = 0; i < 6; ++i) {
-    achieved_[i] = achieved[i];
-    const Lanes lacking = D[i] * (wrench_[i] - achieved[i]);
-    distance += lacking * lacking;
-  }
-  return answered && distance <= kMissing * kMissing * size;
+  for (int i = 0; i < 6; ++i) achieved_[i] = unit_[i] * newton_.achieved()[i];
 }
 
-void Distributor::distribute(const Distributions& distributions) {
-  const Mask answered = findForces();
-  store(distributions.answered, answered);
+// Writes what was found, where it is an answer, and says of other frames that they are left.
+void Distributor::write(const Distributions& distributions, const Mask& answered) {
+  takeForces();
+  const Mask& reached = newton_.isReached();
+  for (int lane = 0; lane < count_; ++lane) {
+    const std::ptrdiff_t frame = frameOf(lane);
+    const Answer answer = reached[lane] ? Answer::Solved : Answer::Relaxed;
+    distributions.answers[frame] = answered[lane] ? answer : Answer::None;
+    if (!answered[lane] && is_carried_[lane]) left_.push_back(frame);
+  }
   const Lanes inverse_mass = 1. / carrier_.mass;
   const Vector acom =
       inverse_mass * Vector{achieved_[0], achieved_[1], achieved_[2]} + broadcast(carrier_.gravity);
-  store(distributions.feasible_acom, acom);
-  store(distributions.feasible_dam, Vector{achieved_[3], achieved_[4], achieved_[5]});
+  storeWhere(answered, distributions.feasible_acom, acom);
+  storeWhere(answered, distributions.feasible_dam,
+             Vector{achieved_[3], achieved_[4], achieved_[5]});
   Lanes residual[6];
   for (int i = 0; i < 6; ++i) residual[i] = wrench_[i] - achieved_[i];
-  store(distributions.residual, residual);
+  storeWhere(answered, distributions.residual, residual);
   for (std::size_t k = 0; k < contacts_.size(); ++k)
-    if (standing_[k].takes_part) storeContact(distributions, k, answered);
+    if (standing_[k].takes_part) writeContact(distributions, k, answered);
+  if (!carrier_.flat_horizontal_ground) writeMeanPressure(distributions, answered);
+}
 
-  if (carrier_.flat_horizontal_ground) return;
-  // The mean of the contacts' own centres of pressure, weighted by their vertical forces (6).
+// The mean of the contacts' own centres of pressure, weighted by their vertical forces (6).
+void Distributor::writeMeanPressure(const Distributions& distributions,
+                                    const Mask& answered) const {
   Vector moment = zero();
   Lanes vertical_force = 0.;
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -666,9 +488,10 @@ void Distributor::distribute(const Distributions& distributions) {
     if (!standing.takes_part) continue;
     const Lanes* f = standing.force;
     const Matrix& R = standing.rotation;
-    Lanes inverse = 1. / f[2];
-    stdx::where(standing.is_active == 0., inverse) = 0.;
-    const Lanes vertical = R.x.z * f[0] + R.y.z * f[1] + R.z.z * f[2];
+    const Mask is_loaded = standing.is_active > 0. && f[2] > 0.;
+    Lanes inverse = 0., vertical = 0.;
+    stdx::where(is_loaded, inverse) = 1. / f[2];
+    stdx::where(is_loaded, vertical) = R.x.z * f[0] + R.y.z * f[1] + R.z.z * f[2];
     const Vector centre = com_ + standing.lever + (-f[4] * inverse) * R.x + (f[3] * inverse) * R.y;
     moment += vertical * centre;
     vertical_force += vertical;
@@ -678,11 +501,11 @@ void Distributor::distribute(const Distributions& distributions) {
       !(vertical_force >= carrier_.minimal_vertical_force) || !(0. * (x + y) == 0.);
   stdx::where(undefined, x) = kNaN;
   stdx::where(undefined, y) = kNaN;
-  store(distributions.cop, {x, y});
+  storeWhere<2>(answered, distributions.cop, {x, y});
 }
 
 // As ContactBase and DynaCoM have it.
-void Distributor::storeContact(const Distributions& distributions, std::size_t k,
+void Distributor::writeContact(const Distributions& distributions, std::size_t k,
                                const Mask& answered) const {
   const Contact& contact = contacts_[k];
   const Standing& standing = standing_[k];
@@ -690,7 +513,7 @@ void Distributor::storeContact(const Distributions& distributions, std::size_t k
   const Lanes* f = standing.force;
   const Matrix& R = standing.rotation;
   const Mask written = answered && standing.is_active > 0.;
-  const Mask unloaded = f[2] < carrier_.minimal_vertical_force;
+  const Mask unloaded = !(f[2] >= carrier_.minimal_vertical_force && f[2] > 0.);
   const Lanes inverse = 1. / f[2];
   const bool is_surface = contact.size == 6;
 

@@ -4,10 +4,10 @@
 #include <cstddef>
 
 // What crosses between the library and its lanes: the per-frame mathematics of analyzeMotion(), in
-// its two steps, for several frames at once, one in each lane of a SIMD register. lanes.cpp is
-// compiled once for each width that registers may have, each time with flags of its own, into a
-// shared object of its own: hence plain arrays, and nothing of Eigen, Pinocchio or the standard
-// library.
+// its two steps, for several frames at once, one in each lane of a SIMD register. lanes.cpp and
+// lane_newton.cpp are compiled once for each width that registers may have, each time with flags of
+// their own, into a shared object of its own: hence plain arrays, and nothing of Eigen, Pinocchio
+// or the standard library.
 //
 // Placements are twelve numbers: the rotation, column by column, and the translation.
 
@@ -83,6 +83,7 @@ struct Carrier {
   double mass;
   double gravity[3];
   double wrench_weights[6];
+  double minimal_scale;  // see WrenchDistribution::solve()
   double ground_height, minimal_vertical_force;
   bool flat_horizontal_ground;
 };
@@ -97,15 +98,22 @@ struct ContactRows {
   double *wrench, *vertical_force, *cop, *friction_usage, *yaw_usage, *cop_margin;
 };
 
+/// What is known of a frame.
+enum class Answer : char {
+  None,    // there is none, whatever was written
+  Solved,  // see DistributionStatus
+  Relaxed,
+};
+
 /// Wrenches about CoMs, one behind the other, and where it goes how contacts share them; see
-/// MotionAnalysis. What is not answered may have been written all the same.
+/// MotionAnalysis.
 struct Distributions {
   std::ptrdiff_t count;
   const double *com, *force, *torque;
   double* cop;
   double *feasible_acom, *feasible_dam, *residual;
   const ContactRows* contacts;
-  bool* answered;  // whether no inequality is active
+  Answer* answers;
 };
 
 /// What each shared object gives by the function "dynacom_lanes".
@@ -122,7 +130,7 @@ struct Interface {
   void (*destroy_distributor)(void* distributor);
 };
 
-constexpr int kVersion = 4;  // grows with each change to this file
+constexpr int kVersion = 5;  // grows with each change to this file
 constexpr char kEntry[] = "dynacom_lanes";
 using Entry = const Interface* (*)();
 

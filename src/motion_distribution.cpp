@@ -109,8 +109,9 @@ class MotionDistribution::Worker {
     is_cold_ = true;
     for (Eigen::Index k = 0; k < frames; ++k) {
       const Eigen::Index frame = first + k;
-      if (lanes_ && lanes_->isAnswered(k))
-        result_.status[static_cast<std::size_t>(frame)] = DistributionStatus::Solved;
+      const auto status = lanes_ ? lanes_->status(k) : std::nullopt;
+      if (status)
+        result_.status[static_cast<std::size_t>(frame)] = *status;
       else
         distribute(frame);
     }

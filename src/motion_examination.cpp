@@ -97,6 +97,13 @@ Eigen::MatrixXd findRecordedConfidence(const std::vector<std::string>& names,
   return confidence;
 }
 
+// In which share of the frames each contact is otherwise in one schedule than in the other.
+Eigen::VectorXd findDisagreement(const ContactSchedule::Matrix& one,
+                                 const ContactSchedule::Matrix& other) {
+  const auto differ = (one.array() != other.array()).cast<double>();
+  return differ.rowwise().sum() / double(one.cols());
+}
+
 // Frames whose accelerations a filter has smeared: those around the beginning and the end of a
 // flight, where the force jumps, by half a period of the cut-off.
 void addSmeared(const ContactSchedule& schedule, const Eigen::VectorXd& time, double cutoff,
@@ -367,34 +374,48 @@ class MotionExaminer::Workspace::Pipeline {
     return unsure;
   }
 
-  // On a slope, points push along its normal in place of the vertical.
-  void tilt(const Eigen::Vector2d& slope, SweptMotion& swept) {
-    const Eigen::Vector3d normal(-slope.x(), -slope.y(), 1.);
-    const auto rotation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal);
-    if (!tilted_) {
-      tilted_ = *split_;
-      for (internal::FixedContact& fixed : tilted_->carrier.contacts) {
-        const auto* point = dynamic_cast<const ContactPoint*>(fixed.contact.get());
-        tilts_.push_back(point && point->getSettings().world_aligned);
-        if (!tilts_.back()) continue;
-        ContactPointSettings settings = point->getSettings();
-        settings.world_aligned = false;
-        fixed.contact = std::make_shared<ContactPoint>(settings);
-      }
-      split_ = &*tilted_;
+  // Of parts that stand on a slope at some time, and push along the vertical by themselves, makes
+  // such as push along the normal that they have in a frame.
+  void makeTilting(const std::vector<Stance>& stances) {
+    std::vector<bool> on_slope(split_->parts.size(), false);
+    for (const Stance& stance : stances)
+      if (!stance.slope.isZero(0.)) on_slope[stance.part] = true;
+    if (std::find(on_slope.begin(), on_slope.end(), true) == on_slope.end()) return;
+    tilted_ = *split_;
+    for (std::size_t k = 0; k < on_slope.size(); ++k) {
+      internal::FixedContact& fixed = tilted_->carrier.contacts[k];
+      const auto* point = dynamic_cast<const ContactPoint*>(fixed.contact.get());
+      tilts_.push_back(on_slope[k] && point && point->getSettings().world_aligned);
+      if (!tilts_.back()) continue;
+      ContactPointSettings settings = point->getSettings();
+      settings.world_aligned = false;
+      fixed.contact = std::make_shared<ContactPoint>(settings);
     }
-    for (std::size_t k = 0; k < swept.parts.size(); ++k) {
-      if (!tilts_[k]) continue;
-      swept.parts[k].rotation.colwise() = rotation.coeffs();
-      const std::size_t owner = split_->parts[k].contact;
+    split_ = &*tilted_;
+  }
+
+  // In stances on slopes, parts have the slope's normal in place of the vertical.
+  void tilt(const std::vector<Stance>& stances, SweptMotion& swept) {
+    if (!tilted_) makeTilting(stances);
+    if (!tilted_) return;
+    for (const Stance& stance : stances) {
+      if (!tilts_[stance.part] || stance.slope.isZero(0.)) continue;
+      const Eigen::Vector3d normal(-stance.slope.x(), -stance.slope.y(), 1.);
+      const auto rotation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal);
+      const auto turn = [&](ContactMotion& moved) {
+        moved.rotation.middleCols(stance.begin, stance.end - stance.begin).colwise() =
+            rotation.coeffs();
+      };
+      turn(swept.parts[stance.part]);
+      const PartRobot::Part& part = split_->parts[stance.part];
       // A point is its own part.
-      if (owner < swept.contacts.size() && swept.contacts[owner].name == split_->parts[k].name)
-        swept.contacts[owner].rotation.colwise() = rotation.coeffs();
+      if (part.contact < swept.contacts.size() && swept.contacts[part.contact].name == part.name)
+        turn(swept.contacts[part.contact]);
     }
   }
 
   void distribute(const ContactInference& inference, SweptMotion& swept) {
-    if (!inference.slope.isZero(0.)) tilt(inference.slope, swept);
+    tilt(inference.stances, swept);
     const double given = settings_.detection.ground_height;
     const double ground_height =
         findMeanGround(inference, std::isnan(given) ? workspace_.robot.getGroundHeight() : given);
@@ -447,10 +468,16 @@ class MotionExaminer::Workspace::Pipeline {
       found.schedule.confidence = findRecordedConfidence(found.schedule.names, *recorded_.schedule);
     found.bodies = internal::gatherBodies(*split_, schedule);
     found.parts = split_->parts;
+    if (found.inferred)
+      found.disagreement = findDisagreement(found.schedule.active, found.inferred->active);
     found.ground = findGround(swept.contacts, found.parts, swept.parts, found.inference.ground);
+    found.terrain = findTerrain(found.parts, found.inference, found.schedule, found.ground,
+                                found.derived.motion.time, settings_.detection.ground_height);
     found.analysis = internal::gatherParts(workspace_.robot, *split_, swept.contacts, swept.parts,
                                            std::move(swept.analysis));
     dropIdle(found.bodies, found.analysis.bodies);
+    found.missing_support =
+        findMissingSupport(workspace_.robot, found.analysis, found.verdict, settings_.verdict);
     found.contacts = std::move(swept.contacts);
     found.part_motions = std::move(swept.parts);
     found.statistics =
@@ -482,7 +509,7 @@ class MotionExaminer::Workspace::Pipeline {
   Mask near_jumps_;
   const ContactSplit* split_ = &workspace_.split;  // what carries: the contacts, or
   std::optional<ContactSplit> links_;              // those with links besides,
-  std::optional<ContactSplit> tilted_;             // and on a slope these, along its normal,
+  std::optional<ContactSplit> tilted_;             // and on slopes these, along their normals,
   std::vector<bool> tilts_;                        // as far as they have the ground's
   std::optional<internal::MotionSweep> link_sweep_;
 };

@@ -264,6 +264,13 @@ const MotionFinding& MotionVerdict::operator[](MotionFault fault) const {
   return findings[static_cast<std::size_t>(fault)];
 }
 
+double MotionVerdict::getSeverity() const {
+  Eigen::Index frames = 0;
+  for (const MotionFinding& finding : findings)
+    if (finding.holds) frames = std::max(frames, finding.frames);
+  return frames > 0 ? double(frames) / double(unsure.size()) : 0.;
+}
+
 std::vector<std::string> MotionVerdict::getCodes() const {
   if (outcome == MotionOutcome::Unknown) return {"too_short"};
   std::vector<std::string> codes;

@@ -7,9 +7,6 @@ namespace dynacom::internal {
 
 namespace {
 
-// What durations may lack through the rounding of times [s].
-constexpr double kRounding = 1e-9;
-
 // Frames without fault one after the other: the first, and the one behind the last.
 struct Run {
   Eigen::Index first, behind;
@@ -34,20 +31,20 @@ std::vector<MotionWindow> findWindows(const Eigen::VectorXd& time,
     return time[std::min(behind, frames - 1)] - time[first];
   };
   const auto isLong = [&](const Run& run) {
-    return lasts(run.first, run.behind) >= settings.interruption - kRounding;
+    return lasts(run.first, run.behind) >= settings.interruption - kTimeRounding;
   };
   // Whether what lies between two runs is too short to end a window.
   const auto isShort = [&](const Run& before, const Run& after) {
     const Eigen::Index first = before.behind, size = after.first - first;
     return !jumps.segment(first, size).any() && isLong(before) && isLong(after) &&
-           lasts(first, after.first) < settings.interruption - kRounding;
+           lasts(first, after.first) < settings.interruption - kTimeRounding;
   };
   std::vector<MotionWindow> windows;
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const Eigen::Index first = runs[k].first;
     while (k + 1 < runs.size() && isShort(runs[k], runs[k + 1])) ++k;
     const Eigen::Index last = runs[k].behind - 1;
-    if (time[last] - time[first] >= settings.minimal_window - kRounding)
+    if (time[last] - time[first] >= settings.minimal_window - kTimeRounding)
       windows.push_back({first, last, time[first], time[last]});
   }
   return windows;

@@ -8,6 +8,9 @@
 
 namespace dynacom::internal {
 
+/// What durations may lack through the rounding of times [s].
+constexpr double kTimeRounding = 1e-9;
+
 /// The windows of a motion, see MotionWindow.
 /// @param time    frames, increasing [s]
 /// @param beyond  frames at fault

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #define BOOST_TEST_MODULE contact_inference
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "dynacom/contact_inference.hpp"
 #include "feet.hpp"
 #include "random_robot.hpp"
+#include "walker.hpp"
 
 using namespace dynacom;
 using namespace dynacom_tests;
@@ -220,4 +223,92 @@ BOOST_AUTO_TEST_CASE(more_parts_than_bits_are_refused) {
   const MotionAnalysis dynamics = analyzeMotion(split.robot, motion, none);
   BOOST_TEST(throws<std::invalid_argument>([&] { inferContacts(split, motions, dynamics, true); },
                                            {"32", "36"}));
+}
+
+namespace {
+
+ContactInference infer(const Walker& walker, const std::vector<Walker::Step>& steps) {
+  const Motion motion = deriveMotion(walker.model, walker.walk(steps), 0.).motion;
+  const PartRobot split = splitContacts(*walker.robot);
+  ContactSchedule none;
+  none.active.resize(0, motion.frames());
+  return inferContacts(split, computeContactMotions(split.robot, motion),
+                       analyzeMotion(split.robot, motion, none), true);
+}
+
+// Stances of parts that carry at some time.
+std::vector<Stance> used(const ContactInference& found) {
+  std::vector<Stance> stances;
+  for (const Stance& stance : found.stances)
+    if (stance.on_ground && found.schedule.active.row(Index(stance.part))
+                                .segment(stance.first, stance.behind - stance.first)
+                                .any())
+      stances.push_back(stance);
+  return stances;
+}
+
+bool isLevel(const ContactInference& found) {
+  return found.slope.isZero(0.) &&
+         std::all_of(found.stances.begin(), found.stances.end(),
+                     [](const Stance& stance) { return stance.slope.isZero(0.); });
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(stances_on_a_ramp_have_its_slope_and_those_before_and_behind_it_none) {
+  const Walker walker;
+  for (const double degrees : {5., 12.}) {
+    const Ground ground = ramp(degrees, 0.65, 1.6);
+    const auto steps = Walker::walkAhead(ground, 11);
+    const ContactInference found = infer(walker, steps);
+    BOOST_TEST(found.slope.isZero(0.));
+    const std::vector<Stance> stances = used(found);
+    BOOST_TEST(stances.size() == 4 * steps.size());
+    Index part = -1, end = 0;
+    for (const Stance& stance : found.stances) {
+      // Each frame belongs to one stance of a part.
+      BOOST_TEST(stance.begin == (Index(stance.part) == part ? end : 0));
+      BOOST_TEST(stance.begin <= stance.first);
+      BOOST_TEST(stance.behind <= stance.end);
+      part = Index(stance.part), end = stance.end;
+    }
+    BOOST_TEST(end == found.schedule.active.cols());
+    // By the order of a foot's stances, which is that of its steps.
+    std::size_t number[8] = {};
+    for (const Stance& stance : stances) {
+      const std::size_t step = 2 * number[stance.part]++ + stance.part / 4;
+      BOOST_TEST(steps[step].foot == int(stance.part / 4));
+      const Vector3d& place = steps[step].place.translation();
+      BOOST_TEST(close(stance.slope, gradientOf(ground, place.x(), place.y()), 1e-3));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_plane_is_the_slope_of_all_and_level_soles_are_on_none) {
+  const Walker walker;
+  const Ground plane = [](double x, double y) { return 0.1 * x + 0.05 * y; };
+  const ContactInference found = infer(walker, Walker::walkAhead(plane, 7));
+  BOOST_TEST(close(found.slope, Vector2d(0.1, 0.05), 1e-3));
+  for (const Stance& stance : used(found)) BOOST_TEST(stance.slope == found.slope);
+
+  const Ground stairs = [](double x, double) { return 0.12 * std::floor(x / 0.25 + 0.5); };
+  BOOST_TEST(isLevel(infer(walker, Walker::walkAhead(stairs, 7))));
+  BOOST_TEST(isLevel(infer(walker, Walker::walkAhead([](double, double) { return 0.; }, 7))));
+}
+
+BOOST_AUTO_TEST_CASE(who_never_moves_or_stands_on_its_toes_shows_no_slope) {
+  const Walker walker;
+  const Ground slope = [](double x, double) { return 0.2 * x; };
+  // Both feet stay; then, one of them is put down again where it was.
+  std::vector<Walker::Step> steps = Walker::walkAhead(slope, 2);
+  BOOST_TEST(isLevel(infer(walker, steps)));
+  steps.push_back(steps[0]);
+  BOOST_TEST(isLevel(infer(walker, steps)));
+  // On toes where it is level: heels are up at each step.
+  const SE3 tilt(
+      pinocchio::SE3::Quaternion(Eigen::AngleAxisd(0.2, Vector3d::UnitY())).toRotationMatrix(),
+      Vector3d(0., 0., 0.1 * std::sin(0.2)));
+  steps = Walker::walkAhead([](double, double) { return 0.; }, 7);
+  for (Walker::Step& step : steps) step.place = step.place * tilt;
+  BOOST_TEST(isLevel(infer(walker, steps)));
 }

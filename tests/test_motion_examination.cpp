@@ -14,6 +14,7 @@
 #include "dynacom/motion_examination.hpp"
 #include "feet.hpp"
 #include "random_robot.hpp"
+#include "walker.hpp"
 
 using namespace dynacom;
 using namespace dynacom_tests;
@@ -141,6 +142,21 @@ BOOST_AUTO_TEST_CASE(an_examination_is_its_steps) {
       BOOST_TEST(close(found.verdict.findings[k].measured, verdict.findings[k].measured, 1e-9));
     BOOST_TEST(close(found.statistics.residual_force_rms, statistics.residual_force_rms, 1e-9));
     BOOST_TEST(found.sensitivity.empty());
+    const Terrain terrain =
+        findTerrain(split.parts, inference, schedule, MatrixXd::Zero(2, motion.frames()),
+                    motion.time, settings.detection.ground_height);
+    BOOST_TEST(close(found.terrain.lowest, terrain.lowest));
+    BOOST_TEST(found.terrain.contacts[1].name == clips.robot.getKnownContacts()[1]);
+    BOOST_TEST(close(found.terrain.contacts[1].height, 0.));
+    BOOST_TEST(found.terrain.held.size() == terrain.held.size());
+    const auto missing = findMissingSupport(clips.robot, analysis, verdict, settings.verdict);
+    BOOST_TEST_REQUIRE(missing.has_value());
+    BOOST_TEST_REQUIRE(found.missing_support.has_value());
+    BOOST_TEST(found.missing_support->frames == missing->frames);
+    BOOST_TEST(close(found.missing_support->force, missing->force, 1e-9));
+    BOOST_TEST(found.missing_support->force <=
+               std::max(found.verdict[MotionFault::ResidualForce].worst,
+                        found.verdict[MotionFault::FlightWithSupportNeeded].worst));
     // Something is out of reach, and something is not.
     BOOST_TEST(statistics.share(DistributionStatus::Solved) > 0.1);
     BOOST_TEST(statistics.share(DistributionStatus::Relaxed) > 0.05);
@@ -160,9 +176,21 @@ BOOST_AUTO_TEST_CASE(what_is_recorded_says_how_sure_it_is) {
   BOOST_TEST((found.schedule.confidence.row(0).array() == 0.).all());
   BOOST_TEST((found.schedule.confidence.row(1).array() == 0.75).all());
   BOOST_TEST(!found.schedule.active.row(0).any());
+  // The other one stands, too: what is given and what is found differ in it.
+  BOOST_TEST_REQUIRE(found.disagreement.size() == 2);
+  for (const Index k : {0, 1}) {
+    Index frames_that_differ = 0;
+    for (Index frame = 0; frame < frames; ++frame)
+      frames_that_differ += found.schedule.active(k, frame) != found.inferred->active(k, frame);
+    BOOST_TEST(found.disagreement[k] == double(frames_that_differ) / double(frames));
+  }
+  BOOST_TEST(found.disagreement[0] > 0.5);
+  BOOST_TEST(found.disagreement[1] < 0.1);
   recorded.schedule->confidence.resize(0, 0);
   found = examineMotion(clips.robot, recorded);
   BOOST_TEST((found.schedule.confidence.row(1).array() == 1.).all());
+  recorded.schedule.reset();
+  BOOST_TEST(examineMotion(clips.robot, recorded).disagreement.size() == 0);
 }
 
 BOOST_AUTO_TEST_CASE(other_cutoffs_are_tried_where_there_was_a_filter) {
@@ -363,4 +391,63 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_examined_is_refused) {
             [](std::size_t, const MotionExamination*, const std::string&) {});
       },
       {"initialize"}));
+}
+
+BOOST_AUTO_TEST_CASE(on_a_ramp_forces_have_its_normal_and_elsewhere_nothing_changes) {
+  const Walker walker;
+  constexpr double degrees = 12.;
+  const RecordedMotion recorded = walker.walk(Walker::walkAhead(ramp(degrees, 0.65, 1.6), 11));
+  const MotionExamination found = examineMotion(*walker.robot, recorded, {});
+  const Index frames = recorded.time.size();
+  std::vector<std::vector<bool>> on_slope(8, std::vector<bool>(std::size_t(frames), false));
+  for (const Stance& stance : found.inference.stances)
+    for (Index frame = stance.begin; frame < stance.end; ++frame)
+      on_slope[stance.part][std::size_t(frame)] = !stance.slope.isZero(0.);
+
+  // The same with points that push along the vertical everywhere.
+  const PartRobot split = splitContacts(*walker.robot);
+  DynaCoM robot = split.robot;
+  robot.setGroundHeight(
+      found.inference.schedule.active.select(found.inference.ground.array(), 0.).sum() /
+      double(found.inference.schedule.active.count()));
+  AnalysisSettings settings;
+  const MotionAnalysis vertical =
+      analyzeMotion(robot, found.derived.motion, found.inference.schedule, settings);
+
+  const double gradient = std::tan(degrees * std::acos(-1.) / 180.);
+  Index level = 0, steep = 0;
+  for (Index frame = 0; frame < frames; ++frame) {
+    bool any = false, all = true;
+    for (std::size_t k = 0; k < 8; ++k)
+      if (found.inference.schedule.active(Index(k), frame)) {
+        any = any || on_slope[k][std::size_t(frame)];
+        all = all && on_slope[k][std::size_t(frame)];
+      }
+    const Vector3d force = found.analysis.ground_force.col(frame);
+    for (std::size_t k = 0; k < 8; ++k) {
+      const MotionAnalysis::Contact& part = found.analysis.parts[k];
+      if (!part.active[frame]) continue;
+      const Vector3d normal =
+          Eigen::Quaterniond(Eigen::Vector4d(found.part_motions[k].rotation.col(frame))) *
+          Vector3d::UnitZ();
+      const Vector2d slope = -normal.head<2>() / normal.z();
+      BOOST_TEST(close(slope, Vector2d(on_slope[k][std::size_t(frame)] ? gradient : 0., 0.), 1e-3));
+    }
+    if (!any) {
+      ++level;
+      for (std::size_t k = 0; k < 8; ++k)
+        BOOST_TEST((found.analysis.parts[k].wrench.col(frame).array() ==
+                    vertical.contacts[k].wrench.col(frame).array())
+                       .all());
+    } else if (all && found.analysis.status[std::size_t(frame)] == DistributionStatus::Solved &&
+               std::abs(force.x()) < 1e-6 && std::abs(force.y()) < 1e-6) {
+      // Who stands still asks of the ground what its weight does.
+      ++steep;
+      for (const MotionAnalysis::Contact& contact : found.analysis.contacts)
+        if (contact.active[frame])
+          BOOST_TEST(close(contact.friction_usage[frame], gradient / 0.7, 2e-3));
+    }
+  }
+  BOOST_TEST(level > frames / 4);
+  BOOST_TEST(steep > 100);
 }

@@ -171,6 +171,55 @@ BOOST_AUTO_TEST_CASE(contacts_have_their_own) {
   BOOST_TEST(std::isnan(statistics.least_cop_margin));
 }
 
+BOOST_AUTO_TEST_CASE(links_have_their_own_and_what_they_do_together) {
+  Case some;
+  BOOST_TEST(some.summarize().bodies.empty());
+  BOOST_TEST(some.summarize().bodies_active_share == 0.);
+  BOOST_TEST(some.summarize().bodies_weight_share_while_active == 0.);
+  MotionAnalysis::Body knee = {"knee", {}, MatrixXd::Zero(3, 4), {}}, hand = knee;
+  knee.active.setConstant(4, false);
+  hand.link = "hand";
+  hand.active = knee.active;
+  knee.active.head(2).setConstant(true);
+  hand.active.segment(1, 2).setConstant(true);
+  knee.force.row(2) << 20., 30., 0., 0.;
+  knee.force.row(0) << 5., 5., 0., 0.;
+  hand.force.row(2) << 0., 10., 12., 0.;
+  some.analysis.bodies = {knee, hand};
+  const MotionStatistics statistics = some.summarize();
+  BOOST_TEST_REQUIRE(statistics.bodies.size() == 2u);
+  BOOST_TEST(statistics.bodies[0].link == "knee");
+  BOOST_TEST(statistics.bodies[0].active_share == 0.5);
+  BOOST_TEST(close(statistics.bodies[0].weight_share, 12.5 / 98.1));
+  BOOST_TEST(close(statistics.bodies[0].largest_vertical_force, 30. / 98.1));
+  BOOST_TEST(statistics.bodies[1].link == "hand");
+  BOOST_TEST(close(statistics.bodies[1].weight_share, 5.5 / 98.1));
+  BOOST_TEST(statistics.bodies_active_share == 0.75);
+  BOOST_TEST(close(statistics.bodies_weight_share_while_active, 24. / 98.1));
+}
+
+BOOST_AUTO_TEST_CASE(a_load_is_lacked_all_the_time) {
+  // What is missing in each frame, in m g and m g m, and whether that may be a load.
+  const auto mayBeLoad = [](double force, double torque, double pull, bool alternates = false) {
+    Case some;
+    for (Index frame = 0; frame < 4; ++frame) {
+      const double sign = alternates && frame % 2 == 1 ? -1. : 1.;
+      some.analysis.residual.col(frame) << pull, 0., sign * force, 0., sign * torque, 0.;
+    }
+    some.analysis.residual *= 98.1;
+    return some.summarize().mayBeLoad();
+  };
+  BOOST_TEST(!mayBeLoad(0., 0., 0.));
+  BOOST_TEST(mayBeLoad(0.05, 0., 0.));
+  BOOST_TEST(mayBeLoad(0., 0.01, 0.));
+  BOOST_TEST(mayBeLoad(0.05, 0.01, 0.01));
+  BOOST_TEST(!mayBeLoad(0.002, 0.002, 0.));      // nothing
+  BOOST_TEST(!mayBeLoad(0.05, 0.01, 0., true));  // up and down
+  BOOST_TEST(!mayBeLoad(0.05, 0.01, 0.03));      // nothing pulls along the ground
+  BOOST_TEST(!mayBeLoad(0.4, 0., 0.));           // nobody carries as much
+  BOOST_TEST(!mayBeLoad(0.05, 0.4, 0.));
+}
+
 BOOST_AUTO_TEST_CASE(a_single_frame_has_no_change) {
   const Case some(1);
   BOOST_TEST(some.summarize().momentum_change == 0.);

@@ -429,6 +429,18 @@ BOOST_AUTO_TEST_CASE(normals_point_up_or_down_while_they_carry) {
   BOOST_TEST(std::isnan(normals[1].downward_share));
 }
 
+BOOST_AUTO_TEST_CASE(severity_is_the_largest_share_of_what_holds) {
+  MotionVerdict verdict = {};
+  verdict.unsure.setConstant(20, false);
+  BOOST_TEST(verdict.getSeverity() == 0.);
+  verdict.findings[0].frames = 19;  // does not hold
+  BOOST_TEST(verdict.getSeverity() == 0.);
+  verdict.findings[3].holds = verdict.findings[5].holds = true;
+  verdict.findings[3].frames = 5;
+  verdict.findings[5].frames = 4;
+  BOOST_TEST(verdict.getSeverity() == 0.25);
+}
+
 BOOST_AUTO_TEST_CASE(codes_settings_and_sizes) {
   BOOST_TEST(to_string(MotionFault::ResidualForce) == std::string("residual_force"));
   BOOST_TEST(to_string(MotionFault::Discontinuity) == std::string("discontinuity"));

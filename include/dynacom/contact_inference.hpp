@@ -16,6 +16,12 @@ struct Stance {
   Eigen::Index first, behind;  ///< frames
   double height;               ///< of the part's lowest point there [m]
   bool on_ground;              ///< whether the ground may carry the part there
+  /// Frames that belong to it: with those of the way from the stance before and to the next one, up
+  /// to where the part is fastest.
+  Eigen::Index begin, end;
+  /// The ground's gradient (∂z/∂x, ∂z/∂y) there; zero where it is level or not known, or where the
+  /// part is never active.
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
 };
 
 /// When which part of a robot touches the ground, and where that ground is.
@@ -29,8 +35,8 @@ struct DYNACOM_EXPORT ContactInference {
   /// What the schedule cannot give of the wrench that the motion needs, 2 × frames: the norms of
   /// the force [m g] and of the moment about the CoM [m g m].
   Eigen::Matrix2Xd missing;
-  /// The ground's gradient (∂z/∂x, ∂z/∂y), where all stances of contacts lie in one plane that is
-  /// not level; else zero.
+  /// The slope that all stances share in which a contact's part is active; zero where there is no
+  /// such one.
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
   /// Velocity of the ground, as given or found, in the world [m/s].
   Eigen::Vector3d ground_velocity = Eigen::Vector3d::Zero();

@@ -8,9 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "dynacom/contact_inference.hpp"
+#include "dynacom/missing_support.hpp"
 #include "dynacom/motion_statistics.hpp"
 #include "dynacom/recorded_motion.hpp"
+#include "dynacom/terrain.hpp"
 
 namespace dynacom {
 
@@ -69,10 +70,15 @@ struct MotionExamination {
   std::vector<Seat> seats;   ///< where links may rest on what nothing is known of
   /// What inferContacts() finds on its own, gathered, where contacts are recorded.
   std::optional<ContactSchedule> inferred;
-  Eigen::MatrixXd ground;   ///< height of the ground under each contact's lowest part, contacts ×
-                            ///< frames [m]; NaN where there is none
+  /// In which share of the frames each contact is otherwise in `inferred` than in `schedule`; of no
+  /// contact where there is no `inferred`.
+  Eigen::VectorXd disagreement;
+  Eigen::MatrixXd ground;  ///< height of the ground under each contact's lowest part, contacts ×
+                           ///< frames [m]; NaN where there is none
+  Terrain terrain;
   MotionAnalysis analysis;  ///< gatherParts()
   MotionVerdict verdict;
+  std::optional<MissingSupport> missing_support;
   MotionStatistics statistics;
   std::vector<CutoffSensitivity> sensitivity;  ///< with half, and with twice the cut-off
 };

@@ -23,6 +23,14 @@ struct ContactStatistics {
   double least_cop_margin;        ///< see DynaCoM::getContactCoPMargin() [m]
 };
 
+/// What a link does in it that touches something besides the contacts.
+struct BodyStatistics {
+  std::string link;
+  double active_share;  ///< of the frames
+  double weight_share;  ///< mean of its vertical force
+  double largest_vertical_force;
+};
+
 /// A motion in a few numbers. Forces are parts of the robot's weight m g, moments of m g times a
 /// metre, unless they say otherwise.
 struct DYNACOM_EXPORT MotionStatistics {
@@ -43,9 +51,17 @@ struct DYNACOM_EXPORT MotionStatistics {
   /// free-flyer's heading, forward, left and up, or the world's where there is no free-flyer.
   Vector6 mean_residual;
   std::vector<ContactStatistics> contacts;  ///< as MotionAnalysis::contacts
+  std::vector<BodyStatistics> bodies;       ///< as MotionAnalysis::bodies
+  /// Share of the frames in which any of these is active, and the mean over these frames of the
+  /// vertical force of all of them; zero if there are none.
+  double bodies_active_share, bodies_weight_share_while_active;
 
   /// Which part of the frames has a status.
   double share(DistributionStatus status) const;
+  /// Whether the mean residual may be that of a load which nobody has told of: it is large enough,
+  /// and much the same all the time, but no larger than what is carried, and pulls along the ground
+  /// by no more than a load does.
+  bool mayBeLoad() const;
 };
 
 /// How much of its friction cone a contact uses in each frame: ‖(f_x, f_y)‖ over μ f_z, 1 on the

@@ -154,6 +154,8 @@ struct DYNACOM_EXPORT MotionVerdict {
   std::vector<ContactNormal> normals;  ///< of each contact of the robot
 
   const MotionFinding& operator[](MotionFault fault) const;
+  /// The largest share of frames beyond the limit of a fault that holds; 0 if none does.
+  double getSeverity() const;
   bool isFeasible() const { return outcome == MotionOutcome::Feasible; }
   /// The codes of the faults that hold; else "feasible"; only "too_short" where that is Unknown.
   std::vector<std::string> getCodes() const;

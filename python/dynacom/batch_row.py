@@ -358,8 +358,7 @@ def _report_row(report: MotionReport, name: str) -> Row:
         "verdict": verdict.outcome,
         "feasible": None if verdict.outcome == "unknown" else verdict.feasible,
         "codes": verdict.codes,
-        "severity": max((f.frames for f in findings.values() if f.holds), default=0)
-        / statistics.frames,
+        "severity": verdict.severity,
         "feasible_share": verdict.feasible_share,
         "windows": window_times(verdict),
         "duration": float(report.clip.time[-1] - report.clip.time[0]),
@@ -377,7 +376,7 @@ def _report_row(report: MotionReport, name: str) -> Row:
     for code, finding in findings.items():
         for column, _, _ in _FAULT_COLUMNS:
             row[f"{code}.{column}"] = getattr(finding, column)
-    grounds = ground_heights(report.robot, found)
+    grounds = ground_heights(found)
     for contact in statistics.contacts:
         for column, _, _ in _CONTACT_COLUMNS:
             value = grounds[contact.name] if column == "ground" else getattr(contact, column)

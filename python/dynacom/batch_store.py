@@ -68,6 +68,9 @@ class Store:
         with writing(folder):
             (folder / "parts").mkdir(parents=True, exist_ok=True)
             lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        # Before it makes its first array, pyarrow imports pandas, if that is there: better while
+        # worker processes start than while they wait for the next clip.
+        pyarrow.array([])
         try:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

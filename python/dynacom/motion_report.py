@@ -31,7 +31,7 @@ from dynacom.dynacom_pywrap import (
     kThinnedRate,
 )
 from dynacom.errors import DynacomError
-from dynacom.missing_contacts import STANDARD_GRAVITY, find_missing, missing_texts, unexplained
+from dynacom.missing_contacts import STANDARD_GRAVITY, missing_summary, missing_texts, unexplained
 from dynacom.motion_file import Clip, read_motion
 from dynacom.other_contacts import body_statistics, body_texts, seat_statistics
 from dynacom.results_folder import results_folder
@@ -381,16 +381,15 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
     derived, statistics = found.derived, found.statistics
     derivatives = _derivatives_text(clip, derived, report.options)
     downward = list(_downward_texts(robot, found.verdict))
-    missing = find_missing(found, report.options)
     notes = [
         *downward,
         *_gravity_texts(robot),
         *clip.notes,
         derivatives,
         report._schedule_text,
-        *terrain_texts(robot, report.options, found),
+        *terrain_texts(report.options, found),
         *body_texts(robot, report.options, found),
-        *missing_texts(missing, found, report.options, is_reversed=bool(downward)),
+        *missing_texts(found, report.options, is_reversed=bool(downward)),
         *_unjudged_texts(found),
     ]
     sensitivity = []
@@ -418,7 +417,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         "derivatives": derivatives,
         "cutoff": derived.cutoff or None,
         "cutoff_sensitivity": sensitivity,
-        "ground": ground_heights(robot, found),
+        "ground": ground_heights(found),
         "ground_velocity": found.inference.ground_velocity.tolist(),
         "contacts": {
             contact.name: {name: getattr(contact, name) for name in _CONTACT_STATISTICS}
@@ -428,7 +427,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         "seats": seat_statistics(found),
         "mean_vertical_force": statistics.mean_vertical_force,
         "momentum_change": statistics.momentum_change,
-        "contact_missing": missing,
+        "contact_missing": missing_summary(found.missing_support),
         "unexplained": unexplained(statistics),
         "measured": _compare_forces(clip, found.analysis),
         "options": report.options.to_dict(),

@@ -4,8 +4,6 @@
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
 from dynacom.analysis_options import AnalysisOptions
 from dynacom.dynacom_pywrap import MotionExamination
 from dynacom.motion_joints import brief
@@ -14,15 +12,14 @@ from dynacom.robots import Robot
 
 def body_statistics(found: MotionExamination) -> dict[str, dict[str, float]]:
     """Link's name -> what part of the frames it is active in, and its vertical force [m g]."""
-    statistics = {}
-    for body in found.analysis.bodies:
-        share = body.force[:, 2] / found.statistics.weight
-        statistics[body.link] = {
-            "active_share": float(np.mean(body.active)),
-            "weight_share": float(share.mean()),
-            "largest_vertical_force": float(share.max()),
+    return {
+        body.link: {
+            "active_share": body.active_share,
+            "weight_share": body.weight_share,
+            "largest_vertical_force": body.largest_vertical_force,
         }
-    return statistics
+        for body in found.statistics.bodies
+    }
 
 
 def seat_statistics(found: MotionExamination) -> list[dict[str, Any]]:
@@ -42,16 +39,15 @@ def seat_statistics(found: MotionExamination) -> list[dict[str, Any]]:
 
 def body_texts(robot: Robot, options: AnalysisOptions, found: MotionExamination) -> Iterator[str]:
     """Sentences on the links that carry, and on those that might and are not known."""
-    bodies = found.analysis.bodies
-    if bodies:
-        active = np.any([body.active for body in bodies], axis=0)
-        force = np.sum([body.force[:, 2] for body in bodies], axis=0)
-        *first, last = (body.link for body in bodies)
+    statistics = found.statistics
+    if statistics.bodies:
+        *first, last = (body.link for body in statistics.bodies)
         names = f"{', '.join(first)} and {last}" if first else last
-        share = force[active].mean() / found.statistics.weight
         yield (
-            f"{names} {'carry' if first else 'carries'} {share:.0%} of the weight in "
-            f"{active.mean():.0%} of the frames; --feet-only leaves such contacts out."
+            f"{names} {'carry' if first else 'carries'} "
+            f"{statistics.bodies_weight_share_while_active:.0%} of the weight in "
+            f"{statistics.bodies_active_share:.0%} of the frames; --feet-only leaves such contacts "
+            "out."
         )
     for seat in seat_statistics(found):
         yield (

@@ -1,45 +1,31 @@
 # SPDX-License-Identifier: BSD-2-Clause
-"""What a motion stands on, in numbers and in sentences."""
+"""What a motion stands on, in sentences."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from dynacom.analysis_options import AnalysisOptions
-from dynacom.dynacom_pywrap import MotionExamination, Stance
-from dynacom.robots import Robot
+from dynacom.dynacom_pywrap import MotionExamination, Terrain
 
 # From which height on a ground is worth a question: most files have theirs at zero [m].
 _FAR_FROM_ZERO = 0.1
-# Stances that differ by more than this stand on different levels [m].
-_LEVEL = 0.05
-# A foot that is held in the air is worth a word after so long [s].
-_HELD = 0.5
 # Schedules that differ in more of the frames than this are worth a word.
 _DISAGREEMENT = 0.02
 
 
-def ground_heights(robot: Robot, found: MotionExamination) -> dict[str, float | None]:
+def ground_heights(found: MotionExamination) -> dict[str, float]:
     """Contact's name -> the median height of the ground under it while it is active [m].
 
-    None where it never is.
+    NaN where it never is.
     """
-    heights = {}
-    # What C++ hands out is a copy: once is enough.
-    actives, ground = np.asarray(found.schedule.active), found.ground
-    for index, name in enumerate(robot.contacts):
-        values = ground[actives[:, index], index]
-        values = values[np.isfinite(values)]
-        heights[name] = float(np.median(values)) if len(values) else None
-    return heights
+    return {contact.name: contact.height for contact in found.terrain.contacts}
 
 
-def terrain_texts(
-    robot: Robot, options: AnalysisOptions, found: MotionExamination
-) -> Iterator[str]:
+def terrain_texts(options: AnalysisOptions, found: MotionExamination) -> Iterator[str]:
     """Sentences on the ground: where it is, how it moves, and what was not taken for it."""
-    heights = ground_heights(robot, found)
-    known = {name: height for name, height in heights.items() if height is not None}
+    terrain, heights = found.terrain, ground_heights(found)
+    known = {name: height for name, height in heights.items() if np.isfinite(height)}
     velocity = found.inference.ground_velocity
     is_told = np.isfinite(options.detection.ground_velocity).all()
     if velocity.any():
@@ -61,9 +47,9 @@ def terrain_texts(
     elif slope := _slope_text(found):
         yield slope
     else:
-        yield from _level_texts(robot, found, known)
+        yield from _level_texts(terrain, known)
     if not found.analysis.bodies:  # who lies or kneels has the feet where they are
-        yield from _held_texts(robot, options, found)
+        yield from _held_texts(options, terrain)
     yield from _disagreement_texts(found)
 
 
@@ -72,102 +58,61 @@ def _text(value: float, digits: int) -> str:
     return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
-def _owners(robot: Robot, found: MotionExamination) -> list[str | None]:
-    """The contact that each part belongs to; None for parts of other links."""
-    names = list(robot.contacts)
-    return [names[part.contact] if part.contact < len(names) else None for part in found.parts]
-
-
-def _stances(found: MotionExamination) -> Iterator[Stance]:
-    """Those of contacts: other links rest anywhere."""
-    count = len(found.schedule.names)
-    of_contact = [part.contact < count for part in found.parts]
-    for stance in found.inference.stances:
-        if of_contact[stance.part]:
-            yield stance
-
-
-def _used(found: MotionExamination) -> Iterator[Stance]:
-    """The stances in which their part is active at some time."""
-    active = np.asarray(found.inference.schedule.active)
-    for stance in _stances(found):
-        if stance.on_ground and active[stance.first : stance.behind, stance.part].any():
-            yield stance
-
-
 def _slope_text(found: MotionExamination) -> str | None:
-    """If the stances lie in a plane that is not level."""
-    gradient = found.inference.slope
-    if not gradient.any():
+    """If some stances are on ground that is not level."""
+    if (gradient := found.inference.slope).any():
+        angle = np.degrees(np.arctan(np.linalg.norm(gradient)))
+        towards = np.degrees(np.arctan2(gradient[1], gradient[0]))
+        return (
+            f"The ground is a slope of {angle:.1f} degrees, which rises towards "
+            f"{_text(towards, 0)} degrees from the world's x axis."
+        )
+    slopes = {contact.name: contact.slopes for contact in found.terrain.contacts if contact.slopes}
+    if not slopes:
         return None
-    angle = np.degrees(np.arctan(np.linalg.norm(gradient)))
-    towards = np.degrees(np.arctan2(gradient[1], gradient[0]))
+    texts = []
+    for name, angles in slopes.items():
+        *first, last = (f"{np.degrees(angle):.1f}" for angle in angles)
+        texts.append(f"{name} on {', '.join(first)}{' and ' if first else ''}{last} degrees")
     return (
-        f"The ground is a slope of {angle:.1f} degrees, which rises towards {_text(towards, 0)} "
-        "degrees from the world's x axis."
+        f"Slopes are stood on, by {'; by '.join(texts)}. Where else they stand, the ground is "
+        "taken for level."
     )
 
 
-def _level_texts(robot: Robot, found: MotionExamination, known: dict[str, float]) -> Iterator[str]:
-    levels: dict[str, list[float]] = {}
-    owners = _owners(robot, found)
-    for stance in _used(found):
-        own = levels.setdefault(owners[stance.part], [])
-        if all(abs(stance.height - level) > _LEVEL for level in own):
-            own.append(stance.height)
+def _level_texts(terrain: Terrain, known: dict[str, float]) -> Iterator[str]:
     steps = []
-    for name, own in levels.items():
-        if len(own) > 1:
-            *first, last = (_text(height, 2) for height in sorted(own))
-            steps.append(f"{name} stands at {', '.join(first)} and {last} m")
+    for contact in terrain.contacts:
+        if len(contact.levels) > 1:
+            *first, last = (_text(height, 2) for height in contact.levels)
+            steps.append(f"{contact.name} stands at {', '.join(first)} and {last} m")
     if steps:
         yield f"{'; '.join(steps)}: steps or stairs, or feet that float."
     else:
         text = ", ".join(f"{name} {_text(height, 3)} m" for name, height in known.items())
         yield f"Height of the ground: {text}."
-    lowest = min((stance.height for stance in _used(found)), default=min(known.values()))
-    if abs(lowest) > _FAR_FROM_ZERO:
+    if abs(terrain.lowest) > _FAR_FROM_ZERO:
         yield "The ground is not near the height 0: is it this robot's motion?"
 
 
-def _held_texts(robot: Robot, options: AnalysisOptions, found: MotionExamination) -> Iterator[str]:
+def _held_texts(options: AnalysisOptions, terrain: Terrain) -> Iterator[str]:
     """Feet, and corners of feet, that are at rest where nothing was seen to carry them."""
-    time, active = found.analysis.time, np.asarray(found.schedule.active)
-    lowest: dict[tuple[str, bool], tuple[float, Stance]] = {}
-    tilted: dict[str, set[str]] = {}
-    on_ground = [stance.height for stance in _used(found)]
-    owners, parts = _owners(robot, found), found.parts
-    for stance in _stances(found):
-        lasts = time[stance.behind - 1] - time[stance.first]
-        name, part = owners[stance.part], parts[stance.part]
-        if stance.on_ground or lasts < _HELD:
-            continue
-        # The rest of it carries.
-        is_tilted = bool(active[stance.first : stance.behind, part.contact].all())
-        if is_tilted:
-            tilted.setdefault(name, set()).add(part.name.removeprefix(f"{name}."))
-        key = name, is_tilted
-        if key not in lowest or stance.height < lowest[key][0]:
-            lowest[key] = stance.height, stance
-    ground, is_given = options.detection.ground_height, True
-    if np.isnan(ground):
-        ground, is_given = np.median(on_ground) if on_ground else 0.0, False
-    for (name, is_tilted), (height, stance) in lowest.items():
-        where = f"{100.0 * (height - ground):.0f} cm up at {time[stance.first]:.2f} s"
-        if is_tilted:
+    for held in terrain.held:
+        where = f"{100.0 * held.height:.0f} cm up at {held.begin:.2f} s"
+        if held.parts:
             yield (
-                f"{name} is tilted: its {' and '.join(sorted(tilted[name]))} rest {where}, and "
-                "carry nothing."
+                f"{held.name} is tilted: its {' and '.join(held.parts)} rest {where}, and carry "
+                "nothing."
             )
-        elif is_given:
+        elif np.isfinite(options.detection.ground_height):
             yield (
-                f"{name} rests {where}, above the ground that --ground-height tells of, and so "
-                "carries nothing."
+                f"{held.name} rests {where}, above the ground that --ground-height tells of, and "
+                "so carries nothing."
             )
         else:
             yield (
-                f"{name} rests {where}, where nothing was seen landed on, and so carries nothing: "
-                "say by --schedule if there is a box."
+                f"{held.name} rests {where}, where nothing was seen landed on, and so carries "
+                "nothing: say by --schedule if there is a box."
             )
 
 
@@ -175,11 +120,9 @@ def _disagreement_texts(found: MotionExamination) -> Iterator[str]:
     """Contacts that are recorded, but which inference finds otherwise."""
     if found.inferred is None:
         return
-    given, own = np.asarray(found.schedule.active), np.asarray(found.inferred.active)
-    shares = (given != own).mean(axis=0)
     if texts := [
         f"{name} in {share:.0%}"
-        for name, share in zip(found.schedule.names, shares, strict=True)
+        for name, share in zip(found.schedule.names, found.disagreement, strict=True)
         if share > _DISAGREEMENT
     ]:
         yield (

@@ -42,6 +42,7 @@ void ConeProjection::add(const Edge& edge, const Vector6& column) {
 
 void ConeProjection::drop(int position) {
   --count_;
+  decomposed_ = std::min(decomposed_, position);
   for (int k = position; k < count_; ++k) {
     edges_[k] = edges_[k + 1];
     factors_[k] = factors_[k + 1];
@@ -51,29 +52,28 @@ void ConeProjection::drop(int position) {
   }
 }
 
-// The factors of least squares, by Cholesky's decomposition of the normal equations; false if the
-// last edge is within the span of the others.
+// The factors of least squares, by Cholesky's decomposition of the normal equations, of which the
+// rows are kept that are still those of the same edges; false if the last edge is within the span
+// of the others.
 bool ConeProjection::solve() {
-  std::array<std::array<double, kEdges>, kEdges> L;
-  std::array<double, kEdges> y, inverse;
-  for (int i = 0; i < count_; ++i) {
-    double rhs = pulls_[i];
+  for (; decomposed_ < count_; ++decomposed_) {
+    const int i = decomposed_;
+    double rhs = pulls_[i], sum = products_[i][i];
     for (int j = 0; j < i; ++j) {
-      double sum = products_[i][j];
-      for (int k = 0; k < j; ++k) sum -= L[i][k] * L[j][k];
-      L[i][j] = sum * inverse[j];
-      rhs -= L[i][j] * y[j];
+      double product = products_[i][j];
+      for (int k = 0; k < j; ++k) product -= L_[i][k] * L_[j][k];
+      L_[i][j] = product * inverse_[j];
+      rhs -= L_[i][j] * y_[j];
+      sum -= L_[i][j] * L_[i][j];
     }
-    double sum = products_[i][i];
-    for (int k = 0; k < i; ++k) sum -= L[i][k] * L[i][k];
     if (!(sum > kDependent)) return false;
-    inverse[i] = 1. / std::sqrt(sum);
-    y[i] = rhs * inverse[i];
+    inverse_[i] = 1. / std::sqrt(sum);
+    y_[i] = rhs * inverse_[i];
   }
   for (int i = count_ - 1; i >= 0; --i) {
-    double value = y[i];
-    for (int k = i + 1; k < count_; ++k) value -= L[k][i] * solution_[k];
-    solution_[i] = value * inverse[i];
+    double value = y_[i];
+    for (int k = i + 1; k < count_; ++k) value -= L_[k][i] * solution_[k];
+    solution_[i] = value * inverse_[i];
   }
   return true;
 }
@@ -103,6 +103,7 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
   // What is left of the last answer, as far as its points are there.
   const std::array<Edge, kEdges> last = edges_;
   const int edges = std::exchange(count_, 0);
+  decomposed_ = 0;
   for (int k = 0; k < edges; ++k)
     if (set >> last[k].point & 1u) add(last[k], direction(last[k], levers, mu));
   while (count_ > 0 && !solve()) drop(count_ - 1);

@@ -89,6 +89,11 @@ class ConeProjection {
   std::array<double, kEdges> pulls_;                         // of the columns with the target
   std::array<double, kEdges> factors_ = {};
   std::array<double, kEdges> solution_ = {};
+  // Of the first edges, rows of Cholesky's factor L of their products, 1 over its diagonal, and
+  // what solves L y = pulls.
+  int decomposed_ = 0;
+  std::array<std::array<double, kEdges>, kEdges> L_;
+  std::array<double, kEdges> inverse_, y_;
   Vector6 target_;
   Vector6 residual_ = Vector6::Zero();
 };

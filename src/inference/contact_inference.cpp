@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "../check.hpp"
 #include "../nan.hpp"
@@ -86,21 +87,47 @@ internal::KnownContacts findKnown(const internal::ContactSplit& parts,
   return known;
 }
 
-// Where contacts stand: the mean place of each stance in which its part is active at some time.
-Eigen::Matrix3Xd findFooting(const ContactInference& found,
-                             const std::vector<internal::PointTrack>& tracks) {
-  std::vector<Eigen::Vector3d> points;
-  for (const Stance& stance : found.stances) {
-    const internal::PointTrack& track = tracks[stance.part];
-    const Index count = stance.behind - stance.first;
-    if (track.is_body || !stance.on_ground ||
-        !found.schedule.active.row(Index(stance.part)).segment(stance.first, count).any())
-      continue;
-    points.push_back(track.position.middleCols(stance.first, count).rowwise().mean());
-    points.back().z() = stance.height;
+// Writes how steep the ground is under contacts. These stand where parts are at rest that are
+// active at some time, those of one contact together.
+void writeSlopes(const std::vector<PartRobot::Part>& parts,
+                 const std::vector<internal::PointTrack>& tracks, ContactInference& found) {
+  std::vector<Stance*> used;
+  for (Stance& stance : found.stances)
+    if (!tracks[stance.part].is_body && stance.on_ground &&
+        found.schedule.active.row(Index(stance.part))
+            .segment(stance.first, stance.behind - stance.first)
+            .any())
+      used.push_back(&stance);
+  std::stable_sort(used.begin(), used.end(), [](const Stance* one, const Stance* other) {
+    return one->first < other->first;
+  });
+  std::vector<internal::Footing> footings;
+  std::vector<Index> behind;                // the frame at which each ends
+  std::vector<std::size_t> whose;           // of each stance, the footing that it belongs to
+  std::map<std::size_t, std::size_t> last;  // of each contact, its latest footing
+  for (const Stance* stance : used) {
+    const std::size_t contact = parts[stance->part].contact;
+    const auto own = last.find(contact);
+    if (own == last.end() || stance->first >= behind[own->second]) {
+      last[contact] = footings.size();
+      footings.push_back({contact, {}});
+      behind.push_back(stance->behind);
+    }
+    whose.push_back(last[contact]);
+    behind[whose.back()] = std::max(behind[whose.back()], stance->behind);
+    Eigen::Matrix3Xd& points = footings[whose.back()].points;
+    points.conservativeResize(3, points.cols() + 1);
+    points.rightCols<1>() = tracks[stance->part]
+                                .position.middleCols(stance->first, stance->behind - stance->first)
+                                .rowwise()
+                                .mean();
+    points(2, points.cols() - 1) = stance->height;
   }
-  return Eigen::Map<const Eigen::Matrix3Xd>(points.empty() ? nullptr : points[0].data(), 3,
-                                            Index(points.size()));
+  const std::vector<Eigen::Vector2d> slopes = internal::findGroundSlopes(footings);
+  for (std::size_t k = 0; k < used.size(); ++k) used[k]->slope = slopes[whose[k]];
+  if (!slopes.empty() && std::all_of(slopes.begin(), slopes.end(),
+                                     [&](const auto& slope) { return slope == slopes[0]; }))
+    found.slope = slopes[0];
 }
 
 }  // namespace
@@ -183,10 +210,17 @@ ContactInference internal::inferContacts(const ContactSplit& parts,
                                           ? findGround(rests[k], frame, active)
                                           : settings.ground_height;
     }
-    for (const internal::Rest& rest : rests[k].list)
-      found.stances.push_back({k, rest.first, rest.behind, rest.height, rest.on_ground});
+    const std::vector<int>& owner = rests[k].owner;
+    Index begin = 0;
+    for (std::size_t i = 0; i < rests[k].list.size(); ++i) {
+      const internal::Rest& rest = rests[k].list[i];
+      const Index end = std::upper_bound(owner.begin(), owner.end(), int(i)) - owner.begin();
+      found.stances.push_back(
+          {k, rest.first, rest.behind, rest.height, rest.on_ground, begin, end});
+      begin = end;
+    }
   }
-  found.slope = internal::findGroundSlope(findFooting(found, tracks));
+  writeSlopes(parts.parts, tracks, found);
   found.schedule.readiness = findReadiness(found.schedule.active, time, settings);
   return found;
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "cone_projection.hpp"
 
@@ -41,10 +42,17 @@ struct Level {
 // active.
 using Levels = std::vector<std::vector<Level>>;
 
+// What changes of a limb's points cost from one frame to the next, and how probable they are: a row
+// for each level that it has in the later frame, with a number for each in the earlier one.
+struct LimbChanges {
+  std::vector<float> cost, probability;
+};
+
 // The sets of a frame: each takes of each limb one of its levels. They are numbered in the manner
 // of digits, the first limb's being the fastest.
 struct FrameSets {
   Levels levels;
+  std::vector<LimbChanges> changes;  // of each limb, since the frame before
   std::vector<Mask> mask;
   std::vector<float> cost;        // of where the points are
   std::vector<float> missing;     // cost of what the set cannot give; before it is known, a bound
@@ -146,6 +154,7 @@ class PathFinder {
     found_.sets.resize(static_cast<std::size_t>(frames));
     found_.probability.setZero(Index(points_.size()), frames);
     found_.missing.resize(2, frames);
+    projected_.resize(static_cast<std::size_t>(frames));
     const std::vector<bool> certain = chooseCertain();
     for (Index first = 0; first < frames; ++first) {
       if (certain[static_cast<std::size_t>(first)]) {
@@ -178,11 +187,11 @@ class PathFinder {
   void makeLevels(Index frame, Levels& levels);
   void makeSets(Index frame, FrameSets& sets);
   static void combineLevels(FrameSets& sets);
-  Eigen::Vector2d project(Index frame, Mask set);
+  Eigen::Vector2d findMissing(Index frame, Mask set);
   float costOf(const Eigen::Vector2d& missing, Index frame) const;
   float leastCostOf(const Eigen::Vector2d& missing, Index frame) const;
   void evaluate(FrameSets& sets, Index frame, std::size_t number) {
-    const Eigen::Vector2d missing = project(frame, sets.mask[number]);
+    const Eigen::Vector2d missing = findMissing(frame, sets.mask[number]);
     sets.setMissing(number, costOf(missing, frame), leastCostOf(missing, frame));
   }
   float changeOf(Mask before, Mask after) const;
@@ -193,6 +202,7 @@ class PathFinder {
   std::vector<bool> chooseCertain();
 
   void findBetween(Index first, Index behind);
+  void findChanges(const FrameSets& before, Index frame, FrameSets& sets) const;
   bool refine(FrameSets& sets, Index frame, std::size_t number);
   std::vector<std::size_t> findCheapestPath(std::size_t count);
   bool findProbability(Index first, Index behind);
@@ -210,7 +220,8 @@ class PathFinder {
   std::vector<std::vector<int>> limbs_;  // points of each
   std::vector<Mask> limb_masks_;
   ConeProjection projection_;
-  Index placed_ = -1;  // the frame of the levers
+  std::vector<std::vector<std::pair<Mask, Eigen::Vector2d>>> projected_;  // what is known, by frame
+  Index placed_ = -1;                                                     // the frame of the levers
   Eigen::Matrix3Xd levers_;
   std::vector<std::pair<double, int>> order_;  // of a limb's points
   FrameSets one_;                              // of a frame by itself
@@ -305,6 +316,11 @@ void PathFinder::makeLevels(Index frame, Levels& levels) {
 void PathFinder::makeSets(Index frame, FrameSets& sets) {
   makeLevels(frame, sets.levels);
   combineLevels(sets);
+  for (const auto& [set, missing] : projected_[static_cast<std::size_t>(frame)]) {
+    const auto place = std::find(sets.mask.begin(), sets.mask.end(), set) - sets.mask.begin();
+    sets.setMissing(static_cast<std::size_t>(place), costOf(missing, frame),
+                    leastCostOf(missing, frame));
+  }
 }
 
 // All that a frame has, as far as its levels are there.
@@ -325,8 +341,13 @@ void PathFinder::combineLevels(FrameSets& sets) {
   sets.is_known.assign(sets.size(), false);
 }
 
-// What a set cannot give in a frame: norms of force [m g] and moment [m g m].
-Eigen::Vector2d PathFinder::project(Index frame, Mask set) {
+// What a set cannot give in a frame: norms of force [m g] and moment [m g m]. It is asked for again
+// where a frame's own choice is not certain.
+Eigen::Vector2d PathFinder::findMissing(Index frame, Mask set) {
+  std::vector<std::pair<Mask, Eigen::Vector2d>>& known =
+      projected_[static_cast<std::size_t>(frame)];
+  for (const auto& [other, missing] : known)
+    if (other == set) return missing;
   if (placed_ != frame)
     for (std::size_t k = 0; k < points_.size(); ++k)
       levers_.col(Index(k)) = points_[k].position.col(frame) - wrench_.com.col(frame);
@@ -334,7 +355,8 @@ Eigen::Vector2d PathFinder::project(Index frame, Mask set) {
   ConeProjection::Vector6 wrench;
   wrench << wrench_.force.col(frame), wrench_.torque.col(frame);
   const auto residual = projection_.project(wrench / weight_, levers_, mu_, set);
-  return {residual.force, residual.torque};
+  known.emplace_back(set, Eigen::Vector2d(residual.force, residual.torque));
+  return known.back().second;
 }
 
 float PathFinder::costOf(const Eigen::Vector2d& missing, Index frame) const {
@@ -373,11 +395,11 @@ Choice PathFinder::choose(Index frame) {
     choice.set |= cheapest(limb)->mask;
     all |= limb.back().mask;
   }
-  found_.missing.col(frame) = project(frame, choice.set);
+  found_.missing.col(frame) = findMissing(frame, choice.set);
   float excess = costOf(found_.missing.col(frame), frame);
   if (!std::isfinite(excess)) return {choice.set, 0.f, 0.f};
   if (excess > negligible(frame) && all != choice.set)
-    excess -= leastCostOf(project(frame, all), frame);
+    excess -= leastCostOf(findMissing(frame, all), frame);
   // A subset of all points may trade force for moment, and so cost less than all of them, which can
   // be no more than hundredths.
   if (all == choice.set || excess <= negligible(frame)) excess = 0.f;
@@ -404,7 +426,7 @@ Choice PathFinder::chooseAmongAll(Index frame) {
     evaluate(sets, frame, best);
     best = sets.findCheapest();
   }
-  found_.missing.col(frame) = project(frame, sets.mask[best]);
+  found_.missing.col(frame) = findMissing(frame, sets.mask[best]);
   Choice choice = {sets.mask[best], std::numeric_limits<float>::infinity(), 0.f};
   choice.ratio = choice.gap;
   for (std::size_t other = 0; other < sets.size(); ++other) {
@@ -480,6 +502,9 @@ void PathFinder::findBetween(Index first, Index behind) {
     sets.is_known.assign(1, true);
   }
 
+  for (std::size_t k = 1; k < count; ++k)
+    findChanges(between_[k - 1], from + Index(k), between_[k]);
+
   const auto forEach = [&](const auto& act) {
     for (Index frame = first; frame < behind; ++frame)
       act(between_[static_cast<std::size_t>(frame - from)], frame);
@@ -495,10 +520,26 @@ void PathFinder::findBetween(Index first, Index behind) {
   forEach([&](FrameSets& sets, Index frame) {
     const Mask set = sets.mask[path[static_cast<std::size_t>(frame - from)]];
     found_.sets[static_cast<std::size_t>(frame)] = set;
-    found_.missing.col(frame) = project(frame, set);
+    found_.missing.col(frame) = findMissing(frame, set);
   });
 
   while (findProbability(from, to)) continue;
+}
+
+void PathFinder::findChanges(const FrameSets& before, Index frame, FrameSets& sets) const {
+  const auto part = float(partOf(time_[frame] - time_[frame - 1]));
+  sets.changes.resize(limbs_.size());
+  for (std::size_t limb = 0; limb < limbs_.size(); ++limb) {
+    LimbChanges& changes = sets.changes[limb];
+    changes.cost.clear();
+    changes.probability.clear();
+    for (const Level& to : sets.levels[limb])
+      for (const Level& from : before.levels[limb]) {
+        changes.cost.push_back(changes_.cost(from.mask, to.mask));
+        changes.probability.push_back(
+            from.mask == to.mask ? 1.f : part * changes_.probability(from.mask, to.mask));
+      }
+  }
 }
 
 // Computes what a set is missing, and if that is something, what those are that may be better; says
@@ -532,26 +573,30 @@ std::vector<std::size_t> PathFinder::findCheapestPath(std::size_t count) {
       const FrameSets& before = between_[k - 1];
       std::size_t below = 1, above = before.size();
       for (std::size_t limb = 0; limb < sets.levels.size(); ++limb) {
-        const std::vector<Level>&from = before.levels[limb], &to = sets.levels[limb];
-        above /= from.size();
-        next.assign(below * to.size() * above, std::numeric_limits<float>::infinity());
+        const std::size_t from = before.levels[limb].size(), to = sets.levels[limb].size();
+        above /= from;
+        next.resize(below * to * above);
         next_origin.resize(next.size());
-        for (std::size_t j = 0; j < to.size(); ++j)
-          for (std::size_t i = 0; i < from.size(); ++i) {
-            const float change = changes_.cost(from[i].mask, to[j].mask);
-            for (std::size_t high = 0; high < above; ++high) {
-              const std::size_t source = (high * from.size() + i) * below;
-              const std::size_t target = (high * to.size() + j) * below;
-              for (std::size_t low = 0; low < below; ++low)
-                if (value[source + low] + change < next[target + low]) {
-                  next[target + low] = value[source + low] + change;
-                  next_origin[target + low] = origin[source + low];
-                }
+        for (std::size_t high = 0; high < above; ++high)
+          for (std::size_t j = 0; j < to; ++j)
+            for (std::size_t low = 0; low < below; ++low) {
+              const float* const change = sets.changes[limb].cost.data() + j * from;
+              const std::size_t first = high * from * below + low;
+              const std::size_t target = (high * to + j) * below + low;
+              float least = std::numeric_limits<float>::infinity();
+              std::size_t source = first;
+              for (std::size_t i = 0; i < from; ++i) {
+                const float candidate = value[first + i * below] + change[i];
+                if (!(candidate < least)) continue;
+                least = candidate;
+                source = first + i * below;
+              }
+              next[target] = least;
+              next_origin[target] = origin[source];
             }
-          }
         value.swap(next);
         origin.swap(next_origin);
-        below *= to.size();
+        below *= to;
       }
       origins_[k] = origin;
     }
@@ -591,27 +636,25 @@ bool PathFinder::findProbability(Index first, Index behind) {
   std::vector<float> next;
   const auto move = [&](std::vector<float>& value, std::size_t k, std::size_t to_k) {
     const FrameSets &before = between_[k], &after = between_[to_k];
-    const Index frame = first + Index(std::min(k, to_k));
-    const auto part = float(partOf(time_[frame + 1] - time_[frame]));
+    const bool is_forward = k < to_k;
     std::size_t below = 1, above = before.size();
     for (std::size_t limb = 0; limb < after.levels.size(); ++limb) {
-      const std::vector<Level>&from = before.levels[limb], &to = after.levels[limb];
-      above /= from.size();
-      next.assign(below * to.size() * above, 0.f);
-      for (std::size_t j = 0; j < to.size(); ++j)
-        for (std::size_t i = 0; i < from.size(); ++i) {
-          const float factor = from[i].mask == to[j].mask
-                                   ? 1.f
-                                   : part * changes_.probability(from[i].mask, to[j].mask);
-          for (std::size_t high = 0; high < above; ++high) {
-            const std::size_t source = (high * from.size() + i) * below;
-            const std::size_t target = (high * to.size() + j) * below;
-            for (std::size_t low = 0; low < below; ++low)
-              next[target + low] += factor * value[source + low];
+      const std::size_t from = before.levels[limb].size(), to = after.levels[limb].size();
+      const float* const factors = between_[std::max(k, to_k)].changes[limb].probability.data();
+      const std::size_t from_step = is_forward ? 1 : to, to_step = is_forward ? from : 1;
+      above /= from;
+      next.resize(below * to * above);
+      for (std::size_t high = 0; high < above; ++high)
+        for (std::size_t j = 0; j < to; ++j)
+          for (std::size_t low = 0; low < below; ++low) {
+            const std::size_t first = high * from * below + low;
+            float sum = 0.f;
+            for (std::size_t i = 0; i < from; ++i)
+              sum += factors[j * to_step + i * from_step] * value[first + i * below];
+            next[(high * to + j) * below + low] = sum;
           }
-        }
       value.swap(next);
-      below *= to.size();
+      below *= to;
     }
   };
   for (std::size_t k = 0; k < count; ++k) {

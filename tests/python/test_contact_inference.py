@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """Contacts found by what a motion needs, of motions that are known by construction: puppet.py."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -139,6 +140,30 @@ def test_a_slope(puppet):
     assert report.summary["verdict"] == "feasible", report.summary["codes"]
     assert "The ground is a slope of" in notes(report)
     assert "steps or stairs" not in notes(report)
+    found = report.examination.inference
+    assert found.slope == pytest.approx([np.tan(np.radians(3.0)), 0.0], abs=2e-3)
+    assert all((stance.slope == found.slope).all() for stance in found.stances if stance.on_ground)
+
+
+def test_a_ramp_between_floors(puppet):
+    begin, end = 0.6, 2.9
+    rise = np.tan(np.radians(3.0))
+    play = walk(rise=lambda x: rise * (np.clip(x, begin, end) - begin), steps=16)
+    report = judge(puppet, play)
+    assert_as_planned(report, play, 1.0 / 120.0)
+    assert report.summary["verdict"] == "feasible", report.summary["codes"]
+    assert not report.examination.inference.slope.any()
+    text = r"Slopes are stood on, by left on (\d\.\d) degrees; by right on \1 degrees\."
+    assert float(re.search(text, notes(report)).group(1)) == pytest.approx(3.0, abs=0.2)
+    assert "steps or stairs" not in notes(report)
+    # Each foot's footings, by where its parts are then.
+    for stance in report.examination.inference.stances:
+        moved = report.examination.part_motions[stance.part]
+        x = moved.position[stance.first : stance.behind, 0].mean()
+        if begin + 0.2 < x < end - 0.2:
+            assert stance.slope == pytest.approx([rise, 0.0], abs=3e-3)
+        elif not begin - 0.2 < x < end + 0.2:
+            assert not stance.slope.any()
 
 
 # Jumps.

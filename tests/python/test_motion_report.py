@@ -9,7 +9,6 @@ import re
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -450,53 +449,6 @@ def test_what_is_missing_for_a_moment_is_not_worth_a_note(talos, walk):
         else:
             assert missing is None
             assert not any("cannot give" in note for note in report.summary["notes"])
-
-
-@pytest.mark.parametrize(
-    ("beyond", "expected"),
-    [
-        ("........", []),
-        (".##.....", []),
-        (".###....", [(1, 3)]),
-        ("......##", []),
-        (".....###", [(5, 7)]),
-        ("#.#.....", [(0, 2)]),
-        ("##..##..", [(0, 5)]),
-        ("##...##.", []),
-        ("###...###", [(0, 2), (6, 8)]),
-        ("#", []),
-    ],
-)
-def test_intervals_of_what_is_missing(beyond, expected):
-    """Of three frames and more, but for interruptions by two and less."""
-    marks = np.array([mark == "#" for mark in beyond], dtype=bool)
-    assert missing_contacts._intervals(marks, 0.1 * np.arange(len(marks)), 0.3) == expected
-
-
-def test_what_is_missing_is_not_that_of_frames_that_are_unsure():
-    """An interruption whose residual is larger, since nobody knows its accelerations."""
-    residual = np.zeros((60, 6))
-    residual[:, 0] = 0.2 * 9.81 * 50.0
-    residual[20] *= 30.0
-    unsure = np.arange(60) == 20
-    codes = ("residual_force", "residual_torque", "cop_outside", "flight_with_support_needed")
-    measured = {code: SimpleNamespace(measured=np.zeros(60)) for code in codes}
-    measured["residual_force"].measured = np.where(unsure, 0.0, 0.2)
-    found = SimpleNamespace(
-        verdict=SimpleNamespace(outcome="not feasible", findings=measured, unsure=unsure),
-        analysis=SimpleNamespace(time=np.arange(60) / 60.0, residual=residual),
-        statistics=SimpleNamespace(mass=50.0),
-    )
-    missing = missing_contacts.find_missing(found, dynacom.AnalysisOptions())
-    assert missing["times"] == [[0.0, 59.0 / 60.0]]
-    assert missing["force"] == pytest.approx(0.2)
-
-
-def test_intervals_without_a_least_duration():
-    """Frames that follow each other are one interval all the same."""
-    marks = np.array([True, True, False, True, False, False, True, True])
-    found = missing_contacts._intervals(marks, 0.1 * np.arange(len(marks)), 0.0)
-    assert found == [(0, 1), (3, 3), (6, 7)]
 
 
 def test_nothing_is_missing_of_what_is_unknown(talos, walk):

@@ -45,6 +45,9 @@ def objects(talos, talos_standing, talos_motion):
     recorded = dynacom.RecordedMotion(motion.time, motion.q)
     examiner = dynacom.MotionExaminer(robot, sensitivity=True)
     examination = examiner.examine(recorded)
+    sunk = dynacom.DetectionSettings()
+    sunk.ground_height = -1.0  # above it, feet are held in the air
+    hovering = dynacom.MotionExaminer(robot, detection=sunk).examine(recorded)
     objects = [
         state,
         dynacom.computeGroundWrench(state, [0.0, 0.0, -9.81]),
@@ -92,6 +95,12 @@ def objects(talos, talos_standing, talos_motion):
         dynacom.BodyPoints("trunk", 1, [[0.0, 0.1, 0.2]], [0.05]),
         dynacom.CollisionPoints([], ["trunk.stl"]),
         dynacom.Seat("pelvis", 3, 9, 0.45, 0.6),
+        dynacom.BodyStatistics("pelvis", 0.5, 0.2, 0.9),
+        hovering.missing_support,
+        hovering.missing_support.intervals[0],
+        hovering.terrain,
+        hovering.terrain.contacts[0],
+        hovering.terrain.held[0],
     ]
     return {type(value).__qualname__: value for value in objects} | {
         "DistributionResult.Contact": result.contacts[0],

@@ -1,0 +1,525 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "lane_newton.hpp"
+
+#include <algorithm>
+
+namespace dynacom::lanes {
+namespace {
+
+// All of these are for a problem whose weighted wrench has unit size, as in dual_newton.cpp.
+
+constexpr int kNormal = Cone::kNormal;
+// ε of each attempt, as parts of the mean compliance, at first and at last.
+constexpr double kSlacks[DualNewton::kAttempts][2] = {{1e-5, 1e-8}, {1e-4, 1e-9}};
+// How many steps a search may take.
+constexpr int kMaximalSteps = 20;
+// Along a step, what part of the slope at its start is as good as none.
+constexpr double kFlat = 0.6;
+// How often a step is cut, and how often until it is enough to have come to another state.
+constexpr int kMaximalCuts = 30;
+constexpr int kEasyCuts = 3;
+// For which ratio of two lengths their middle is the geometric one.
+constexpr double kFarApart = 4.;
+// What part of the largest pivot the least must be, so that the contacts give all wrenches.
+constexpr double kFullRank = 1e-6;
+// Of a direction of the wrenches that the contacts give, what remains outside of the others: more
+// than the first, it is one of its own, less than the second, it is rounding.
+constexpr double kIndependent = 1e-5;
+constexpr double kDependent = 1e-11;
+// The distance from the closest wrench: more than the first, times how far wrench weights are
+// apart, it has digits enough, less than the second, it is rounding. Over this distance, rounding
+// of a unit wrench is 1e-10, two digits below what is taken for a multiplier.
+constexpr double kFar = 1e-6;
+constexpr double kReached = 1e-13;
+// What an answer may lack, and how often it is corrected, beginning with none; out of reach more
+// often, because there what is missing is to be accurate, too.
+constexpr double kMissing = 1e-12;
+constexpr int kFreeCorrections = 2;
+constexpr int kCorrections = 3;
+// By how much the signs of an answer may be wrong, beside the terms that make them up.
+constexpr double kRounding = 1e-12;
+// Of the distance, a multiplier that is not zero, and one that is.
+constexpr double kHeld = 1e-8;
+constexpr double kFree = 1e-12;
+// By how much terms may be larger than the costs that they make up.
+constexpr double kCancellation = 1e6;
+
+inline Wrench difference(const Wrench& a, const Wrench& b) {
+  Wrench c;
+  for (int i = 0; i < 6; ++i) c[i] = a[i] - b[i];
+  return c;
+}
+
+inline void setZero(Wrench& a) {
+  for (Lanes& number : a.at) number = 0.;
+}
+
+inline Lanes select(const Mask& mask, const Lanes& so, const Lanes& otherwise) {
+  Lanes chosen = otherwise;
+  stdx::where(mask, chosen) = so;
+  return chosen;
+}
+
+// Calls a function with the number of a contact's components, which the compiler knows then.
+template <class Function>
+inline void withSize(int size, Function function) {
+  if (size == 6)
+    function(std::integral_constant<int, 6>());
+  else
+    function(std::integral_constant<int, 3>());
+}
+
+// The state that a pull wants, and the forces in it. What x_z would have to be less,
+//
+//     x_z − g_z − Σ βᵢ max(0, |gᵢ| − βᵢ x_z),
+//
+// rises, ever less steeply: from zero on, where all that pull sideways are at their bounds,
+// Newton's method comes from the left, and lets go of one bound at least with each step.
+template <int kSize>
+inline void followPull(Cone& cone) {
+  Lanes sizes[kSize], resisting = 0., stiffness = 1.;  // x_z is their ratio
+  for (int i = 0; i < kSize; ++i) sizes[i] = stdx::abs(cone.pull[i]);
+  for (int step = 0; step < kSize; ++step) {
+    Lanes next_resisting = cone.pull[kNormal], next_stiffness = 1.;
+    for (int i = 0; i < kSize; ++i) {
+      if (i == kNormal) continue;
+      const double beta = cone.betas[i];
+      const Mask held = sizes[i] * stiffness > beta * resisting;
+      stdx::where(held, next_resisting) = next_resisting + beta * sizes[i];
+      stdx::where(held, next_stiffness) = next_stiffness + beta * beta;
+    }
+    resisting = stdx::max(Lanes(0.), next_resisting);
+    stiffness = next_stiffness;
+  }
+  cone.inverse_stiffness = 1. / stiffness;
+  const Lanes normal = resisting * cone.inverse_stiffness;
+  const Mask loaded = normal > 0.;
+  cone.loaded = select(loaded, 1., 0.);
+  for (int i = 0; i < kSize; ++i) {
+    const Lanes& pull = cone.pull[i];
+    const Lanes most = cone.betas[i] * normal;
+    const Mask held = loaded && sizes[i] > most;
+    cone.force[i] = stdx::max(-most, stdx::min(most, pull));
+    // What has no extent is always at a bound.
+    cone.bounds[i] =
+        cone.betas[i] == 0. ? cone.loaded : select(held, select(pull < 0., -1., 1.), 0.);
+  }
+  cone.force[kNormal] = normal;
+  cone.bounds[kNormal] = cone.loaded;
+}
+
+// How forces respond to a pull, as long as the state stays.
+template <int kSize>
+inline void respond(const Cone& cone, const Lanes* pull, Lanes* force) {
+  Lanes along = 0.;
+  for (int i = 0; i < kSize; ++i) along += cone.edge(i) * pull[i];
+  along *= cone.inverse_stiffness;
+  for (int i = 0; i < kSize; ++i) force[i] = cone.isFree(i) * pull[i] + along * cone.edge(i);
+}
+
+template <int kSize>
+inline void findPull(const Cone& cone, const Wrench& multipliers, Lanes* pull) {
+  for (int i = 0; i < kSize; ++i) pull[i] = dot(cone.e[i], multipliers);
+}
+
+template <int kSize>
+inline void addWrench(const Cone& cone, Wrench& wrench) {
+  for (int i = 0; i < kSize; ++i) add(cone.force[i], cone.e[i], wrench);
+}
+
+// The wrench of a unit of the normal force, and what goes with it.
+inline Wrench normalWrench(const Cone& cone) {
+  Wrench wrench = cone.e[kNormal];
+  for (int i = 0; i < cone.size; ++i)
+    if (i != kNormal) add(cone.bounds[i] * cone.betas[i], cone.e[i], wrench);
+  return wrench;
+}
+
+}  // namespace
+
+DualNewton::DualNewton(const std::vector<Contact>& contacts) : cones_(contacts.size()) {
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const Contact& contact = contacts[k];
+    cones_[k].size = contact.size;
+    for (int i = 0; i < contact.size; ++i)
+      if (i != kNormal)
+        cones_[k].betas[i] = contact.betas[i] * contact.weights[i] / contact.weights[kNormal];
+  }
+  directions_.reserve(6 * contacts.size());
+}
+
+// Enters the state in which all contacts bear a load and no component is at its bound, from which
+// the first step leads to the closed form for forces without inequalities; with multipliers of
+// zero.
+void DualNewton::begin() {
+  setZero(multipliers_);
+  for (Cone& cone : cones_) {
+    if (!cone.is_there) continue;
+    cone.loaded = cone.inverse_stiffness = 1.;
+    for (int i = 0; i < cone.size; ++i) {
+      cone.bounds[i] = i == kNormal || cone.betas[i] == 0. ? 1. : 0.;
+      cone.pull[i] = 0.;
+    }
+  }
+}
+
+// Begins a step that changes the multipliers.
+void DualNewton::startStep(const Wrench& change) {
+  for (Cone& cone : cones_) {
+    if (!cone.is_there) continue;
+    withSize(cone.size, [&](auto size) { findPull<size>(cone, change, cone.pull_change); });
+    cone.start_loaded = cone.loaded;
+    for (int i = 0; i < cone.size; ++i) {
+      cone.start_bounds[i] = cone.bounds[i];
+      cone.start_pull[i] = cone.pull[i];
+    }
+  }
+}
+
+// The forces after a part of a step, in the state that they want then.
+DualNewton::Along DualNewton::followStep(const Lanes& length) {
+  Along along = {0., 0., Mask(false)};
+  for (Cone& cone : cones_) {
+    if (!cone.is_there) continue;
+    withSize(cone.size, [&](auto size) {
+      for (int i = 0; i < size; ++i)
+        cone.pull[i] = cone.start_pull[i] + length * cone.pull_change[i];
+      followPull<size>(cone);
+      Lanes change[size];
+      respond<size>(cone, cone.pull_change, change);
+      along.changed = along.changed || cone.loaded != cone.start_loaded;
+      for (int i = 0; i < size; ++i) {
+        along.slope += cone.force[i] * cone.pull_change[i];
+        along.curvature += change[i] * cone.pull_change[i];
+        along.changed = along.changed || cone.bounds[i] != cone.start_bounds[i];
+      }
+    });
+  }
+  return along;
+}
+
+void DualNewton::sumUp() {
+  setZero(achieved_);
+  for (const Cone& cone : cones_)
+    if (cone.is_there) withSize(cone.size, [&](auto size) { addWrench<size>(cone, achieved_); });
+}
+
+// How the wrench rises with its multipliers, as long as the state stays.
+void DualNewton::assembleCompliance() {
+  for (auto& row : compliance_)
+    for (Lanes& number : row) number = 0.;
+  const auto addSquare = [&](const Lanes& scale, const Wrench& column) {
+    for (int j = 0; j < 6; ++j) {
+      const Lanes scaled = scale * column[j];
+      for (int i = j; i < 6; ++i) compliance_[i][j] += scaled * column[i];
+    }
+  };
+  for (const Cone& cone : cones_) {
+    if (!cone.is_there || stdx::none_of(cone.loaded != 0.)) continue;
+    addSquare(cone.loaded * cone.inverse_stiffness, normalWrench(cone));
+    for (int i = 0; i < cone.size; ++i) {
+      const Lanes is_free = cone.isFree(i);
+      if (stdx::any_of(is_free != 0.)) addSquare(is_free, cone.e[i]);
+    }
+  }
+}
+
+// Factors of the compliance with ε.
+Factors DualNewton::factorise(const Lanes& slack) const {
+  Factors factors;
+  for (int j = 0; j < 6; ++j) {
+    for (int i = j; i < 6; ++i) factors.m[i][j] = compliance_[i][j];
+    factors.m[j][j] += slack;
+  }
+  factors.compute();
+  return factors;
+}
+
+// Takes a step, or a part of it: the slope along it rises from negative on, and the full step is
+// taken unless the slope is positive there; else one is sought where it has nearly vanished, or at
+// least the state is another. From a state that is not the one of the multipliers at hand, where
+// slopes say nothing, it is the full step. Returns where that leaves the state as it is; where no
+// length is found, nobody searches any more.
+Mask DualNewton::takeStep(const Wrench& change, const Wrench& gradient, const Lanes& slack,
+                          const Mask& is_full, Mask& searching) {
+  const Lanes slope = dot(gradient, change);
+  searching = searching && slope < 0.;
+  startStep(change);
+  const Lanes slope_of_rest = slack * dot(multipliers_, change) - dot(target_, change);
+  const Lanes curvature_of_rest = slack * dot(change, change);
+  Lanes length = 1., lower = 0., upper = 1.;
+  Mask cutting = searching, stays(false);
+  for (int cut = 0; stdx::any_of(cutting); ++cut) {
+    if (cut == kMaximalCuts) {
+      searching = searching && !cutting;
+      break;
+    }
+    Along along = followStep(length);
+    along.slope += slope_of_rest + length * curvature_of_rest;
+    along.curvature += curvature_of_rest;
+    const Mask descends = along.slope < 0.;
+    Mask enough = stdx::abs(along.slope) <= -kFlat * slope;
+    if (cut == 0) {
+      stays = searching && !along.changed;
+      enough = enough || stays || descends || is_full;
+    } else if (cut >= kEasyCuts) {
+      enough = enough || (descends && along.changed);
+    }
+    cutting = cutting && !enough;
+    stdx::where(cutting && descends, lower) = length;
+    stdx::where(cutting && !descends, upper) = length;
+    // Where the slope would vanish if the state stayed, unless that is known to be too far.
+    const Lanes next = length - along.slope / along.curvature;
+    const Lanes middle = select(upper > kFarApart * lower && lower > 0., stdx::sqrt(lower * upper),
+                                0.5 * (lower + upper));
+    stdx::where(cutting, length) =
+        select(next > lower && next < upper && Mask(cut % 3 != 2), next, middle);
+  }
+  for (int i = 0; i < 6; ++i) multipliers_[i] += length * change[i];
+  return stays;
+}
+
+// Newton's method with ε, until the state stays. Returns where it does.
+//
+// Out of reach, multipliers are as large as 1/ε, and from those that belong to a wrong state it
+// takes many small steps. With an ε that is not that small there are few, and its state is nearly
+// that of the last ε, which begins anew from there: with multipliers of zero, so that the first
+// step leads to those that belong to this state.
+Mask DualNewton::search(const Lanes& first_slack, const Lanes& last_slack) {
+  Mask searching(true), found(false), is_fresh(true);
+  Lanes slack = first_slack;
+  begin();
+  Wrench gradient;  // of the dual
+  for (int i = 0; i < 6; ++i) gradient[i] = -target_[i];
+  for (int step = 0; step < kMaximalSteps && stdx::any_of(searching); ++step) {
+    assembleCompliance();
+    Wrench change;
+    for (int i = 0; i < 6; ++i) change[i] = select(searching, -gradient[i], 0.);
+    factorise(slack).solve(change.at);
+    const Mask stays = takeStep(change, gradient, slack, is_fresh, searching);
+    is_fresh = stays && slack > last_slack;
+    found = found || (stays && !is_fresh);
+    searching = searching && !found;
+    sumUp();
+    stdx::where(is_fresh, slack) = last_slack;
+    for (int i = 0; i < 6; ++i) {
+      stdx::where(is_fresh, multipliers_[i]) = 0.;
+      gradient[i] = achieved_[i] + slack * multipliers_[i] - target_[i];
+      stdx::where(is_fresh, gradient[i]) = -target_[i];
+    }
+    for (Cone& cone : cones_)
+      if (cone.is_there)
+        for (Lanes& number : cone.pull) stdx::where(is_fresh, number) = 0.;
+  }
+  return found;
+}
+
+// Changes the multipliers in the state at hand. The forces change by what they respond to the
+// change, which is more accurate than what they respond to the sum.
+void DualNewton::correct(const Wrench& change) {
+  for (int i = 0; i < 6; ++i) multipliers_[i] += change[i];
+  for (Cone& cone : cones_) {
+    if (!cone.is_there) continue;
+    withSize(cone.size, [&](auto size) {
+      Lanes pull[size], force[size];
+      findPull<size>(cone, change, pull);
+      respond<size>(cone, pull, force);
+      for (int i = 0; i < size; ++i) {
+        cone.pull[i] += pull[i];
+        cone.force[i] += force[i];
+      }
+    });
+  }
+  sumUp();
+}
+
+// An orthonormal basis of the wrenches that the state can give, whatever it costs: one direction
+// after the other, of which the most is new; and zeros behind. Returns where the rank is certain.
+Mask DualNewton::findRange() {
+  directions_.clear();
+  const auto append = [&](const Lanes& is_one, const Wrench& direction) {
+    const Lanes size = norm(direction);
+    const Lanes scale = select(size > 0., is_one / size, 0.);
+    Wrench& added = directions_.emplace_back();
+    for (int i = 0; i < 6; ++i) added[i] = scale * direction[i];
+  };
+  for (const Cone& cone : cones_) {
+    if (!cone.is_there || stdx::none_of(cone.loaded != 0.)) continue;
+    append(cone.loaded, normalWrench(cone));
+    for (int i = 0; i < cone.size; ++i)
+      if (stdx::any_of(cone.isFree(i) != 0.)) append(cone.isFree(i), cone.e[i]);
+  }
+  Mask is_certain(true), is_complete(false);
+  for (int rank = 0; rank < 6; ++rank) {
+    Lanes most = 0.;
+    Wrench& basis = range_[rank];
+    setZero(basis);
+    for (const Wrench& direction : directions_) {
+      const Lanes size = dot(direction, direction);
+      const Mask is_more = size > most;
+      stdx::where(is_more, most) = size;
+      for (int i = 0; i < 6; ++i) stdx::where(is_more, basis[i]) = direction[i];
+    }
+    most = stdx::sqrt(most);
+    is_complete = is_complete || most <= kDependent;
+    is_certain = is_certain && (is_complete || most >= kIndependent);
+    for (int k = 0; k < rank; ++k) add(-dot(range_[k], basis), range_[k], basis);
+    const Lanes scale = select(is_complete, 0., 1. / norm(basis));
+    for (int i = 0; i < 6; ++i) basis[i] *= scale;
+    for (Wrench& direction : directions_) add(-dot(basis, direction), basis, direction);
+  }
+  return is_certain;
+}
+
+// The forces in the state at hand that give a wrench within its range, by factors of the compliance
+// in the range's coordinates. Returns where they do.
+Mask DualNewton::reach(const Wrench& wrench, const Factors& factors, int corrections) {
+  setZero(multipliers_);
+  setZero(achieved_);
+  for (Cone& cone : cones_)
+    for (int i = 0; i < 6; ++i) cone.pull[i] = cone.force[i] = 0.;
+  for (int correction = 0; correction < corrections; ++correction) {
+    const Wrench lacking = difference(wrench, achieved_);
+    Lanes coordinates[6];
+    for (int j = 0; j < 6; ++j) coordinates[j] = dot(range_[j], lacking);
+    factors.solve(coordinates);
+    Wrench change;
+    setZero(change);
+    for (int j = 0; j < 6; ++j) add(coordinates[j], range_[j], change);
+    correct(change);
+  }
+  return norm(difference(wrench, achieved_)) <= kMissing;
+}
+
+// From the state to the answer, without ε. Returns where there is one.
+Mask DualNewton::finish(double spread) {
+  // The closest wrench is the projection on what the directions span.
+  missing_ = target_;
+  for (int twice = 0; twice < 2; ++twice)
+    for (const Wrench& direction : range_) add(-dot(direction, missing_), direction, missing_);
+  const Lanes distance = norm(missing_);
+  is_reached_ = distance <= kReached;
+  for (Lanes& number : missing_.at) stdx::where(is_reached_, number) = 0.;
+
+  // In the coordinates of the range: beyond its rank, all zeros, the diagonal is 1.
+  Factors factors;
+  for (int j = 0; j < 6; ++j) {
+    Wrench product;
+    for (int i = 0; i < 6; ++i) {
+      product[i] = 0.;
+      for (int k = 0; k < 6; ++k)
+        product[i] += compliance_[std::max(i, k)][std::min(i, k)] * range_[j][k];
+    }
+    for (int i = j; i < 6; ++i) factors.m[i][j] = dot(range_[i], product);
+    factors.m[j][j] += select(dot(range_[j], range_[j]) > 0., 0., 1.);
+  }
+  factors.compute();
+  const Mask is_given = reach(difference(target_, missing_), factors, kCorrections);
+  return is_given && (is_reached_ || distance >= kFar * spread) && provesItself();
+}
+
+// Where multipliers of both stages have the signs that they must have, and forces are in their
+// cones: the conditions of Karush, Kuhn and Tucker of one contact, as DualNewton::provesItself() of
+// dual_newton.cpp asks for them.
+// @param terms  what forces and pulls are sums of, without signs
+// @param costs  the largest of all forces
+Mask DualNewton::provesItself(const Cone& cone, const Lanes (&terms)[6], const Lanes& costs) const {
+  const Lanes distance = norm(missing_);
+  const auto sizeOf = [&](int i) { return distance * norm(cone.e[i]); };
+  const Mask loaded = cone.loaded > 0.;
+  Mask proven(true);
+  const Lanes of_distance = dot(cone.e[kNormal], missing_);
+  // What makes a normal force expensive, its size, and what its rounding may be.
+  Lanes resistance_of_distance = -of_distance, resistance = -cone.pull[kNormal];
+  Lanes size = sizeOf(kNormal), rounding = kRounding * terms[kNormal];
+  double largest_beta = 1.;
+  for (int i = 0; i < cone.size; ++i) {
+    if (i == kNormal) continue;
+    const double beta = cone.betas[i];
+    const Lanes pull_of_distance = dot(cone.e[i], missing_), own_size = sizeOf(i);
+    const Lanes own_rounding = kRounding * terms[i];
+    const Lanes& force = cone.force[i];
+    const Lanes& pull = cone.pull[i];
+    const Mask is_held = stdx::abs(pull_of_distance) > kFree * own_size;
+    proven = proven && (!is_held || stdx::abs(pull_of_distance) >= kHeld * own_size);
+    const Mask is_bound = loaded && cone.bounds[i] != 0. && Mask(beta > 0.);
+    const Mask is_free = loaded && cone.bounds[i] == 0.;
+    proven = proven && (!is_free || (!is_held && stdx::abs(force) <= beta * cone.force[kNormal] +
+                                                                         kRounding * costs));
+    const Mask pulls_outwards = (is_held && cone.bounds[i] * pull_of_distance >= 0.) ||
+                                (!is_held && cone.bounds[i] * (pull - force) >= -own_rounding);
+    proven = proven && (!is_bound || pulls_outwards);
+    const Lanes bound = select(is_bound, cone.bounds[i],
+                               select(select(is_held, pull_of_distance, pull) < 0., -1., 1.));
+    resistance_of_distance -= select(is_free, 0., bound * beta * pull_of_distance);
+    resistance -= select(is_free, 0., bound * beta * pull);
+    size += beta * own_size;
+    rounding += beta * own_rounding;
+    largest_beta = std::max(largest_beta, beta);
+  }
+  const Mask is_held = resistance_of_distance >= kHeld * size && distance > 0.;
+  const Mask stays_unloaded =
+      is_held || (stdx::abs(resistance_of_distance) <= kFree * size && resistance >= -rounding);
+  const Mask pushes = largest_beta * cone.force[kNormal] >= -kRounding * costs;
+  return proven && ((loaded && pushes) || (!loaded && stays_unloaded));
+}
+
+// Where forces are inside of their cones, so that nothing else needs a proof.
+Mask DualNewton::isInside() const {
+  Mask inside(true);
+  for (const Cone& cone : cones_) {
+    if (!cone.is_there) continue;
+    const Lanes& normal = cone.force[kNormal];
+    Mask own = normal > 0.;
+    for (int i = 0; i < cone.size; ++i)
+      if (i != kNormal) own = own && stdx::abs(cone.force[i]) <= cone.betas[i] * normal;
+    inside = inside && (own || !cone.isPresent());
+  }
+  return inside;
+}
+
+Mask DualNewton::provesItself() const {
+  Lanes costs = kRounding;
+  for (const Cone& cone : cones_)
+    if (cone.is_there)
+      for (int i = 0; i < cone.size; ++i) costs = stdx::max(costs, stdx::abs(cone.force[i]));
+  Mask proven(true);
+  for (const Cone& cone : cones_) {
+    if (!cone.is_there) continue;
+    Lanes terms[6];
+    for (int i = 0; i < cone.size; ++i) {
+      terms[i] = stdx::abs(cone.force[i]);
+      for (int j = 0; j < 6; ++j) terms[i] += stdx::abs(cone.e[i][j] * multipliers_[j]);
+      proven = proven && terms[i] <= kCancellation * costs;
+    }
+    proven = proven && provesItself(cone, terms, costs);
+  }
+  return proven;
+}
+
+Mask DualNewton::solveFreely(const Wrench& target) {
+  target_ = target;
+  is_reached_ = Mask(true);
+  begin();
+  assembleCompliance();
+  const Factors factors = factorise(0.);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) range_[i][j] = i == j ? 1. : 0.;
+  const Mask gives_all = factors.least_pivot > kFullRank * factors.largest_pivot;
+  const Mask is_given = reach(target, factors, kFreeCorrections);
+  return gives_all && is_given && isInside();
+}
+
+Mask DualNewton::solve(const Wrench& target, double spread, int attempt) {
+  target_ = target;
+  Lanes mean_compliance = 0.;
+  for (const Cone& cone : cones_)
+    if (cone.is_there)
+      for (int i = 0; i < cone.size; ++i) mean_compliance += dot(cone.e[i], cone.e[i]) / 6.;
+  const Mask found =
+      search(kSlacks[attempt][0] * mean_compliance, kSlacks[attempt][1] * mean_compliance);
+  const Mask is_certain = findRange();
+  return found && is_certain && finish(spread);
+}
+
+}  // namespace dynacom::lanes
