@@ -24,6 +24,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dynacom.dynacom_pywrap import (
+    CentroidalFilterSettings,
     DetectionSettings,
     FaultLimit,
     VerdictSettings,
@@ -48,6 +49,8 @@ class AnalysisOptions:
         flat: whether the centre of pressure is that of flat horizontal ground.
         feet_only: whether nothing but the robot's contacts may touch the ground; else its links
             may, too, where contacts do not suffice.
+        distance: whether to find how far motions are from feasible ones.
+        filter: how that is found, see ``distanceToFeasible``.
         detection: how contacts are found, see ``inferContacts``.
         verdict: limits of the verdict, see ``judgeMotion``.
     """
@@ -56,6 +59,8 @@ class AnalysisOptions:
     omega: float = 0.0
     flat: bool = True
     feet_only: bool = False
+    distance: bool = True
+    filter: CentroidalFilterSettings = field(default_factory=CentroidalFilterSettings)
     detection: DetectionSettings = field(default_factory=DetectionSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
 
@@ -69,6 +74,7 @@ class AnalysisOptions:
             raise ValueError(f"cutoff must be finite and >= 0 Hz, {AUTO} or none, got {cutoff:g}")
         if not (math.isfinite(self.omega) and self.omega >= 0.0):
             raise ValueError(f"omega must be finite and >= 0 rad/s, got {self.omega:g}")
+        self.filter.validate()
         self.detection.validate()
         self.verdict.validate()
 
@@ -115,7 +121,12 @@ class AnalysisOptions:
 
     def _update(self, changes: list[tuple[Any, str]], where: str) -> None:
         # What is in range depends on other settings: it is looked at when all have been changed.
-        changed = replace(self, detection=self.detection.copy(), verdict=self.verdict.copy())
+        changed = replace(
+            self,
+            filter=self.filter.copy(),
+            detection=self.detection.copy(),
+            verdict=self.verdict.copy(),
+        )
         for values, place in changes:
             _update(changed, values, place)
         try:
@@ -135,7 +146,13 @@ class AnalysisOptions:
         return _to_dict(self)
 
 
-_GROUPS = (AnalysisOptions, DetectionSettings, VerdictSettings, FaultLimit)
+_GROUPS = (
+    AnalysisOptions,
+    CentroidalFilterSettings,
+    DetectionSettings,
+    VerdictSettings,
+    FaultLimit,
+)
 
 
 def _names(group: Any) -> list[str]:

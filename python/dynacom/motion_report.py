@@ -331,6 +331,8 @@ def make_examiner(
         sensitivity,
         # A robot without contacts is not to stand on links of which nobody has said anything.
         bodies=[] if options.feet_only or not robot.contacts else robot.collision_points.bodies,
+        distance=options.distance,
+        filter=options.filter,
         **others,
     )
 
