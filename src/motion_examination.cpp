@@ -284,10 +284,7 @@ class MotionExaminer::Workspace::Pipeline {
     makeRelative(found.inference.ground_velocity, swept.parts);
     distribute(found.inference, swept);
     found.verdict = judge(found.derived, found.inference, swept);
-    if (settings_.distance && found.verdict.outcome != MotionOutcome::Unknown) {
-      found.distance = findDistance(found.derived, found.inference, swept);
-      found.verdict.weighDistance(*found.distance, settings_.verdict);
-    }
+    found.distance = weighDistance(found.derived, found.inference, swept, found.verdict);
     found.seats = findSeats(found.inference, swept, found.verdict);
     write(swept, found);
     for (const double cutoff : cutoffs) found.sensitivity.push_back(tryCutoff(cutoff, found));
@@ -460,18 +457,25 @@ class MotionExaminer::Workspace::Pipeline {
         settings_.verdict, workspace_.workers);
   }
 
-  // Around flights, where accelerations are smeared, what pushes a little earlier or later may
-  // push.
-  CentroidalChange findDistance(const DerivedMotion& derived, const ContactInference& inference,
-                                const SweptMotion& swept) const {
+  // Tells a verdict of the distance, if somebody asks for it and something can be said. Around
+  // flights, where accelerations are smeared, what pushes a little earlier or later may push.
+  std::optional<CentroidalChange> weighDistance(const DerivedMotion& derived,
+                                                const ContactInference& inference,
+                                                const SweptMotion& swept,
+                                                MotionVerdict& verdict) const {
+    if (!settings_.distance || verdict.outcome == MotionOutcome::Unknown ||
+        !swept.analysis.com.allFinite())
+      return std::nullopt;
     ContactSchedule schedule = inference.schedule;
     const Eigen::VectorXd& time = derived.motion.time;
     Mask smeared = Mask::Constant(time.size(), false);
     addSmeared(schedule, time, derived.cutoff, smeared);
     widen(time, smeared, derived.cutoff, schedule);
-    return internal::distanceToFeasible(*split_, swept.parts, swept.analysis, schedule,
-                                        settings_.filter, near_jumps_ || derived.unsure,
-                                        workspace_.workers);
+    CentroidalChange change = internal::distanceToFeasible(
+        *split_, swept.parts, swept.analysis, schedule, settings_.filter,
+        near_jumps_ || derived.unsure, workspace_.workers);
+    verdict.weighDistance(change, settings_.verdict);
+    return change;
   }
 
   // Looks for seats where more is missing than who leans lacks.
@@ -525,8 +529,7 @@ class MotionExaminer::Workspace::Pipeline {
     makeRelative(found.inference.ground_velocity, swept.parts);
     distribute(found.inference, swept);
     MotionVerdict verdict = judge(derived, found.inference, swept);
-    if (found.distance)
-      verdict.weighDistance(findDistance(derived, found.inference, swept), settings_.verdict);
+    weighDistance(derived, found.inference, swept, verdict);
     MotionStatistics statistics =
         summarizeMotion(workspace_.robot, derived.motion,
                         internal::gatherParts(workspace_.robot, *split_, swept.contacts,

@@ -82,8 +82,9 @@ struct MotionExamination {
   MotionAnalysis analysis;  ///< gatherParts()
   MotionVerdict verdict;
   std::optional<MissingSupport> missing_support;
-  /// distanceToFeasible(), where the settings ask for it and the verdict is not Unknown. Around
-  /// flights, contacts count that are active within half a period of the cut-off.
+  /// distanceToFeasible(), where the settings ask for it, the verdict is not Unknown and no frame
+  /// is too large for numbers. Nothing is asked of frames near jumps and near ends that are unsure;
+  /// around flights, contacts count that are active within half a period of the cut-off.
   std::optional<CentroidalChange> distance;
   MotionStatistics statistics;
   std::vector<CutoffSensitivity> sensitivity;  ///< with half, and with twice the cut-off

