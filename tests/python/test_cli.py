@@ -227,7 +227,7 @@ def test_check(command, tmp_path):
     assert command(*strict)[0] == 0
     status, printed, err = command(*strict, "--check")
     assert (status, err) == (1, "")
-    assert ("Verdict", "not feasible") in cells(printed)
+    assert ("Verdict", "repairable") in cells(printed)
     assert sorted(os.listdir(tmp_path)) == FILES
     assert summary(tmp_path)["codes"] == ["foot_sliding"]
 
@@ -480,7 +480,11 @@ def test_what_is_printed(analyze, motion_file, talos):
     limits = (f"verdict.{code}.limit=0" for code in ("foot_sliding", "ground_penetration"))
     out, printed = analyze(motion_file(), *(part for text in limits for part in ("--set", text)))
     rows, found = cells(printed), summary(out)
-    assert rows[0] == ("Verdict", "not feasible")
+    assert rows[0] == ("Verdict", "repairable")
+    title, text = rows.pop(1)
+    rms, largest = (f"{1e3 * found['distance'][name]:.1f} mm" for name in ("rms", "largest"))
+    assert title == "Distance"
+    assert text.startswith(f"{rms} from a feasible motion (RMS; {largest} at most, at ")
     reasons = [entry for entry in found["reasons"] if entry["holds"]]
     assert len(reasons) >= 2
     assert rows[1 : 1 + len(reasons)] == [(entry["code"], entry["text"]) for entry in reasons]

@@ -339,7 +339,7 @@ def test_unknown(talos, tmp_path, monkeypatch):
     q, arrays, summary = walk_report(talos)
     for item in summary["reasons"]:
         item["holds"] = True
-    unknown = {"verdict": "unknown", "windows": [], "feasible_share": 0.0}
+    unknown = {"verdict": "unknown", "distance": None, "windows": [], "feasible_share": 0.0}
     write_page(tmp_path / "report.html", talos, q, arrays, summary | unknown)
     text = (tmp_path / "report.html").read_text("utf-8")
     assert '<section class="verdict unknown"><h2>Unknown</h2><p><code>too_short</code>' in text
