@@ -56,10 +56,8 @@ def report(robot: Robot, motion: Motion, schedule: ContactSchedule) -> tuple[Arr
     names = ("com", "vcom", "acom", "am", "dam", "ground_force", "ground_torque", "cop", "vrp")
     arrays = {name: getattr(analysis, name) for name in ("time", *names, "nl", "residual")}
     arrays["status"] = np.array([status.name for status in analysis.status])
-    # As if a feasible motion were beside it, by 2 cm in its middle.
-    displacement = np.zeros_like(analysis.com)
-    displacement[:, 1] = 0.02 * np.sin(np.linspace(0.0, np.pi, len(displacement)))
-    arrays["distance"] = displacement[:, 1]
+    displacement = _find_displacement(dynamics, motion, schedule)
+    arrays["distance"] = np.linalg.norm(displacement, axis=1)
     arrays["feasible_com"] = analysis.com + displacement
     arrays["dcm"] = arrays["com"][:, :2] + arrays["vcom"][:, :2] / analysis.omega
 
@@ -75,6 +73,25 @@ def report(robot: Robot, motion: Motion, schedule: ContactSchedule) -> tuple[Arr
             for name, array in _contact_arrays(contact, settings, poses[contact.name]).items()
         }
     return arrays, _summary(robot, arrays, weight, analysis.omega)
+
+
+def _find_displacement(
+    robot: dynacom.DynaCoM, motion: Motion, schedule: ContactSchedule
+) -> np.ndarray:
+    """Of the CoM to the closest feasible motion, where soles carry with all their corners."""
+    split = dynacom.splitContacts(robot)
+    none = ContactSchedule([], np.zeros((len(motion.time), 0), dtype=bool))
+    active = {name: np.asarray(schedule.active)[:, k] for k, name in enumerate(schedule.names)}
+    parts = ContactSchedule(
+        [part.name for part in split.parts],
+        np.column_stack([active[part.name.partition(".")[0]] for part in split.parts]),
+    )
+    return dynacom.distanceToFeasible(
+        split,
+        dynacom.computeContactMotions(split.robot, motion),
+        dynacom.analyzeMotion(split.robot, motion, none),
+        parts,
+    ).com
 
 
 def _contact_arrays(contact: Any, settings: Any, poses: list[pin.SE3]) -> Arrays:

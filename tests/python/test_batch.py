@@ -443,11 +443,11 @@ def test_the_table_is_in_order_however_rows_come(tmp_path, anymal, monkeypatch, 
 
 @pytest.fixture
 def slow(tmp_path, anymal):
-    """Clips that take a while each, and a file that tells how often each has been read."""
+    """Clips that take longer than parts are kept back, and a file that tells how often each is."""
     folder, log = tmp_path / "slow", tmp_path / "log"
     folder.mkdir()
     for number in range(24):
-        statement = f"import time; open({str(log)!r}, 'a').write('{number}\\n'); time.sleep(0.15)"
+        statement = f"import time; open({str(log)!r}, 'a').write('{number}\\n'); time.sleep(0.2)"
         write_program(folder / f"{number:02}.pkl", anymal, 5 * number, statement)
     return folder, log
 

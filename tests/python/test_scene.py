@@ -29,7 +29,12 @@ Report = tuple[np.ndarray, Arrays, Summary]
 
 @pytest.fixture(scope="module")
 def walk(talos: Robot) -> Report:
-    return walk_report(talos)
+    """As if a feasible motion were beside it, by 2 cm in the middle."""
+    q, arrays, summary = walk_report(talos)
+    displacement = np.zeros_like(arrays["com"])
+    displacement[:, 1] = 0.02 * np.sin(np.linspace(0.0, np.pi, len(displacement)))
+    com = arrays["com"] + displacement
+    return q, arrays | {"distance": displacement[:, 1], "feasible_com": com}, summary
 
 
 @pytest.fixture(scope="module")
