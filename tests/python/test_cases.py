@@ -76,6 +76,10 @@ def test_leaning(cases):
     worst = report.verdict.findings["cop_outside"].worst
     assert worst == pytest.approx(0.05, abs=0.002)
     assert 45.0 < millimetres(report) < 60.0
+    # Back over the toes, that is, and neither up nor down.
+    moved = report["feasible_com"] - report["com"]
+    assert (moved[:, 0] < -0.04).all()
+    assert np.abs(moved[:, 1:]).max() < 0.005
 
 
 def test_on_the_edges_of_tilted_soles(cases):
