@@ -119,6 +119,14 @@ def _contact_arrays(contact: Any, settings: Any, poses: list[pin.SE3]) -> Arrays
     }
 
 
+def _verdict(arrays: Arrays, reasons: list[dict[str, Any]]) -> str:
+    distance = arrays["distance"]
+    if not any(reason["holds"] for reason in reasons):
+        return "feasible"
+    is_near = np.sqrt(np.mean(distance**2)) <= 0.01 and distance.max() <= 0.05
+    return "repairable" if is_near else "not feasible"
+
+
 def _summary(robot: Robot, arrays: Arrays, weight: float, omega: float) -> Summary:
     time = arrays["time"]
     force = np.linalg.norm(arrays["residual"][:, :3], axis=1) / weight
@@ -159,7 +167,7 @@ def _summary(robot: Robot, arrays: Arrays, weight: float, omega: float) -> Summa
         "duration": float(time[-1] - time[0]),
         "frame_rate": (len(time) - 1) / float(time[-1] - time[0]),
         "omega": omega,
-        "verdict": "not feasible" if any(reason["holds"] for reason in reasons) else "feasible",
+        "verdict": _verdict(arrays, reasons),
         "distance": {
             "rms": float(np.sqrt(np.mean(arrays["distance"] ** 2))),
             "largest": float(arrays["distance"].max()),

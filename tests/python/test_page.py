@@ -31,7 +31,7 @@ def hurried(talos: Robot) -> Report:
         faster = {"t": file["t"] / haste, "v": haste * file["v"], "a": haste**2 * file["a"]}
     q, arrays, summary = walk_report(talos, **faster)
     summary["clip"] = "talos_hurries.npz"
-    assert summary["verdict"] == "not feasible"
+    assert summary["verdict"] == "repairable"
     return q, arrays, summary
 
 
@@ -89,7 +89,7 @@ def test_page_in_a_browser(hurried_page, hurried, request, root):
     time = arrays["time"]
     with open_page(hurried_page) as tab:
         player = open_scene(tab).locator("input.mantine-NumberInput-input")
-        assert tab.locator(".verdict h2").inner_text() == "Not feasible"
+        assert tab.locator(".verdict h2").inner_text() == "Repairable"
         for plot in ("above", *TIME_PLOTS[:-1]):
             lengths = tab.locator(f"#{plot} path.js-line").evaluate_all(
                 "(lines) => lines.map((line) => line.getTotalLength())"
@@ -228,7 +228,7 @@ def test_hostile_names(talos, hurried, tmp_path, monkeypatch):
             return {names.get(key, key): renamed(item) for key, item in value.items()}
         if isinstance(value, list):
             return [renamed(item) for item in value]
-        return HOSTILE if isinstance(value, str) and value != "not feasible" else value
+        return HOSTILE if isinstance(value, str) and value != "repairable" else value
 
     codes = [{**item, "code": f"{item['code']}{HOSTILE}"} for item in summary["reasons"]]
     hostile = renamed({**summary, "reasons": [], "statuses": {HOSTILE: 318}})
@@ -297,16 +297,17 @@ def test_feasible_walk(talos, tmp_path, monkeypatch):
         assert title not in bare
 
 
-def test_repairable(talos, hurried, tmp_path, monkeypatch):
-    """It has a colour of its own, and the reasons that hold stand open."""
+@pytest.mark.parametrize(("verdict", "kind"), [("repairable", "fair"), ("not feasible", "bad")])
+def test_what_is_not_feasible(talos, hurried, tmp_path, monkeypatch, verdict, kind):
+    """What is repairable has a colour of its own; the reasons that hold stand open."""
     monkeypatch.setitem(sys.modules, "viser", None)
     q, arrays, summary = hurried
     held = sum(item["holds"] for item in summary["reasons"])
     assert held > 0
-    write_page(tmp_path / "report.html", talos, q, arrays, summary | {"verdict": "repairable"})
+    write_page(tmp_path / "report.html", talos, q, arrays, summary | {"verdict": verdict})
     text = (tmp_path / "report.html").read_text("utf-8")
-    assert '<section class="verdict fair"><h2>Repairable</h2>' in text
-    opened = text[text.index('class="verdict fair"') : text.index("<details>")]
+    assert f'<section class="verdict {kind}"><h2>{verdict.capitalize()}</h2>' in text
+    opened = text[text.index(f'class="verdict {kind}"') : text.index("<details>")]
     assert opened.count("<code>") == held
     largest = arrays["distance"].max()
     assert 0.001 < largest < 0.01
