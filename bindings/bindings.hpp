@@ -30,6 +30,7 @@ void exposeMotion();
 void exposeContactSchedule();
 void exposeCollisionPoints();
 void exposeContactInference();
+void exposeCentroidalFilter();
 void exposeRecordedMotion();
 void exposeMotionAnalysis();
 void exposeMotionVerdict();

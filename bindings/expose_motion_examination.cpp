@@ -18,6 +18,10 @@ bp::object getMissingSupport(const Examination& examination) {
   return examination.missing_support ? bp::object(*examination.missing_support) : bp::object();
 }
 
+bp::object getDistance(const Examination& examination) {
+  return examination.distance ? bp::object(*examination.distance) : bp::object();
+}
+
 bp::list getSeats(const Examination& examination) { return toList(examination.seats); }
 
 std::shared_ptr<Seat> makeSeat(const std::string& link, Eigen::Index first, Eigen::Index behind,
@@ -55,13 +59,16 @@ std::shared_ptr<MotionExaminer> makeExaminer(const DynaCoM& robot, double cutoff
                                              const DetectionSettings& detection,
                                              const VerdictSettings& verdict, bool sensitivity,
                                              const bp::object& progress, int threads, int lanes,
-                                             const bp::object& bodies) {
+                                             const bp::object& bodies, bool distance,
+                                             const CentroidalFilterSettings& filter) {
   const AnalysisSettings analysis = {flat_horizontal_ground, omega, nullptr, threads, lanes};
   const ExaminationSettings settings = {cutoff,
                                         analysis,
                                         detection,
                                         verdict,
                                         toVectorOf<BodyPoints>(bodies),
+                                        distance,
+                                        filter,
                                         sensitivity,
                                         toProgress<double>(progress)};
   return std::make_shared<MotionExaminer>(robot, settings);
@@ -131,6 +138,9 @@ void exposeMotionExamination() {
       .def_readonly("verdict", &Examination::verdict, "The MotionVerdict")
       .add_property("missing_support", &getMissingSupport,
                     "The MissingSupport, or None where nothing is missing or can be said")
+      .add_property("distance", &getDistance,
+                    "The CentroidalChange to a feasible motion, or None where nobody asked for it\n"
+                    "or nothing can be said")
       .def_readonly("statistics", &Examination::statistics, "The MotionStatistics")
       .add_property("sensitivity", &getSensitivity,
                     "A CutoffSensitivity for half, and for twice the cut-off")
@@ -142,30 +152,34 @@ void exposeMotionExamination() {
       "MotionExaminer",
       "Judges recorded motions of one robot, a DynaCoM, which is copied: deriveMotion,\n"
       "computeContactMotions, inferContacts for the contacts' parts, analyzeMotion, gatherParts,\n"
-      "findTerrain, judgeMotion, findMissingSupport and summarizeMotion, one after the other. The\n"
+      "findTerrain, judgeMotion, distanceToFeasible, findMissingSupport and summarizeMotion, one "
+      "after the other. The\n"
       "ground that the centre of pressure lies on is the mean of those that are stood on. "
       "Threads,\n"
       "solvers and storage are kept from one motion to the next.",
       bp::no_init)
-      .def("__init__",
-           bp::make_constructor(
-               &makeExaminer, bp::default_call_policies(),
-               (bp::arg("robot"), bp::arg("cutoff") = defaults.cutoff,
-                bp::arg("flatHorizontalGround") = defaults.analysis.flat_horizontal_ground,
-                bp::arg("omega") = defaults.analysis.omega,
-                bp::arg("detection") = defaults.detection, bp::arg("verdict") = defaults.verdict,
-                bp::arg("sensitivity") = defaults.sensitivity, bp::arg("progress") = bp::object(),
-                bp::arg("threads") = defaults.analysis.threads,
-                bp::arg("lanes") = defaults.analysis.lanes, bp::arg("bodies") = bp::list())),
-           "cutoff: of the filter where derivatives have to be computed, 0 for none [Hz];\n"
-           "sensitivity: whether to judge motions with half and twice the cut-off, too; progress:\n"
-           "called now and then with what part of the frames is analysed; bodies: BodyPoints of\n"
-           "links that may touch the ground where contacts do not suffice, of "
-           "findCollisionPoints():\n"
-           "dynacom.analyze gives them, and without them nobody kneels or lies; the others as in "
-           "the\n"
-           "functions named above. Raises ValueError if one is out of its range, NotReadyError\n"
-           "before the robot's initialize().")
+      .def(
+          "__init__",
+          bp::make_constructor(
+              &makeExaminer, bp::default_call_policies(),
+              (bp::arg("robot"), bp::arg("cutoff") = defaults.cutoff,
+               bp::arg("flatHorizontalGround") = defaults.analysis.flat_horizontal_ground,
+               bp::arg("omega") = defaults.analysis.omega,
+               bp::arg("detection") = defaults.detection, bp::arg("verdict") = defaults.verdict,
+               bp::arg("sensitivity") = defaults.sensitivity, bp::arg("progress") = bp::object(),
+               bp::arg("threads") = defaults.analysis.threads,
+               bp::arg("lanes") = defaults.analysis.lanes, bp::arg("bodies") = bp::list(),
+               bp::arg("distance") = defaults.distance, bp::arg("filter") = defaults.filter)),
+          "cutoff: of the filter where derivatives have to be computed, 0 for none [Hz];\n"
+          "sensitivity: whether to judge motions with half and twice the cut-off, too; progress:\n"
+          "called now and then with what part of the frames is analysed; bodies: BodyPoints of\n"
+          "links that may touch the ground where contacts do not suffice, of "
+          "findCollisionPoints():\n"
+          "dynacom.analyze gives them, and without them nobody kneels or lies; distance:\n"
+          "whether to find how far motions are from feasible ones, by distanceToFeasible with the\n"
+          "settings of filter; the others as in the functions named above. Raises ValueError if "
+          "one is out of its range, NotReadyError\n"
+          "before the robot's initialize().")
       .def("examine", &examine, (bp::arg("self"), bp::arg("recorded")),
            "The MotionExamination of a RecordedMotion, whatever was examined before. Raises\n"
            "ValueError if the motion or its schedule is not valid.")

@@ -125,6 +125,10 @@ void exposeMotionVerdict() {
       .def_readwrite("interruption", &Settings::interruption,
                      "Interruptions of a window that are shorter are none where there is as much\n"
                      "time without fault before and after them [s]")
+      .def_readwrite("repairable_distance", &Settings::repairable_distance,
+                     "A motion is repairable up to this distance to feasible, root mean square [m]")
+      .def_readwrite("repairable_largest_distance", &Settings::repairable_largest_distance,
+                     "And up to this largest one [m]")
       .def(SettingsVisitor<Settings>());
 
   bp::class_<MotionFinding>("MotionFinding", "What was found of one fault.", bp::no_init)
@@ -175,7 +179,7 @@ void exposeMotionVerdict() {
       bp::no_init)
       .add_property("findings", &getFindings, "A MotionFinding for each fault, by its code")
       .add_property("feasible", &MotionVerdict::isFeasible, "Whether that is the outcome")
-      .add_property("outcome", &getOutcome, "'feasible', 'not feasible' or 'unknown'")
+      .add_property("outcome", &getOutcome, "'feasible', 'repairable', 'not feasible' or 'unknown'")
       .add_property("codes", &getCodes,
                     "Of the faults that hold; else 'feasible', or 'too_short' alone where the\n"
                     "outcome is unknown")

@@ -42,6 +42,7 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeMotionAnalysis();
   exposeCollisionPoints();
   exposeContactInference();
+  exposeCentroidalFilter();
   exposeMotionVerdict();
   exposeMissingSupport();
   exposeTerrain();

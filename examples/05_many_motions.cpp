@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   // Clips are read by several threads, each when it is wanted, and forgotten when they are judged:
   // there might be a million of them, in files. What one keeps of them is up to the caller.
   struct Row {
-    bool is_feasible;
+    dynacom::MotionOutcome outcome;
     double solved, largest;
   };
   std::array<std::optional<Row>, periods.size()> table;
@@ -29,15 +29,14 @@ int main(int argc, char** argv) {
       return;
     }
     const dynacom::MotionStatistics& statistics = found->statistics;
-    table[clip] =
-        Row{found->verdict.isFeasible(), statistics.share(dynacom::DistributionStatus::Solved),
-            statistics.contacts[0].largest_vertical_force};
+    table[clip] = Row{found->verdict.outcome, statistics.share(dynacom::DistributionStatus::Solved),
+                      statistics.contacts[0].largest_vertical_force};
   };
   dynacom::analyzeMotions(talos, clips.size(), read, keep);
 
   for (std::size_t k = 0; k < periods.size(); ++k)
     if (table[k])
       std::printf("%.1f s: %s, within reach %3.0f %%, left sole up to %.2f m g\n", periods[k],
-                  table[k]->is_feasible ? "feasible" : "not feasible", 100. * table[k]->solved,
+                  dynacom::to_string(table[k]->outcome), 100. * table[k]->solved,
                   table[k]->largest);
 }

@@ -20,6 +20,7 @@
 #include "motion_judgement.hpp"
 #include "motion_sweep.hpp"
 #include "nan.hpp"
+#include "repair/centroidal_filter.hpp"
 #include "seat_search.hpp"
 #include "standard_gravity.hpp"
 #include "support_meter.hpp"
@@ -30,6 +31,7 @@ void ExaminationSettings::validate() const {
   internal::requireField(std::isnan(cutoff) || (cutoff >= 0. && std::isfinite(cutoff)),
                          "ExaminationSettings.cutoff", "finite and >= 0 Hz, or NaN", cutoff);
   analysis.validate();
+  filter.validate();
   detection.validate();
   verdict.validate();
 }
@@ -117,6 +119,21 @@ void addSmeared(const ContactSchedule& schedule, const Eigen::VectorXd& time, do
       unsure[k] = true;
     for (Eigen::Index k = frame - 1; k >= 0 && time[frame - 1] - time[k] <= width; --k)
       unsure[k] = true;
+  }
+}
+
+// Lets contacts be active in some frames that are so within half a period of the cut-off.
+void widen(const Eigen::VectorXd& time, const Mask& frames, double cutoff,
+           ContactSchedule& schedule) {
+  const ContactSchedule::Matrix active = schedule.active;
+  for (Eigen::Index frame = 0; frame < time.size(); ++frame) {
+    if (!frames[frame]) continue;
+    for (const int way : {-1, 1})
+      for (Eigen::Index k = frame; k >= 0 && k < time.size(); k += way) {
+        if (std::abs(time[k] - time[frame]) > 0.5 / cutoff) break;
+        schedule.active.col(frame).array() =
+            schedule.active.col(frame).array() || active.col(k).array();
+      }
   }
 }
 
@@ -267,6 +284,7 @@ class MotionExaminer::Workspace::Pipeline {
     makeRelative(found.inference.ground_velocity, swept.parts);
     distribute(found.inference, swept);
     found.verdict = judge(found.derived, found.inference, swept);
+    found.distance = weighDistance(found.derived, found.inference, swept, found.verdict);
     found.seats = findSeats(found.inference, swept, found.verdict);
     write(swept, found);
     for (const double cutoff : cutoffs) found.sensitivity.push_back(tryCutoff(cutoff, found));
@@ -439,6 +457,27 @@ class MotionExaminer::Workspace::Pipeline {
         settings_.verdict, workspace_.workers);
   }
 
+  // Tells a verdict of the distance, if somebody asks for it and something can be said. Around
+  // flights, where accelerations are smeared, what pushes a little earlier or later may push.
+  std::optional<CentroidalChange> weighDistance(const DerivedMotion& derived,
+                                                const ContactInference& inference,
+                                                const SweptMotion& swept,
+                                                MotionVerdict& verdict) const {
+    if (!settings_.distance || verdict.outcome == MotionOutcome::Unknown ||
+        !swept.analysis.com.allFinite())
+      return std::nullopt;
+    ContactSchedule schedule = inference.schedule;
+    const Eigen::VectorXd& time = derived.motion.time;
+    Mask smeared = Mask::Constant(time.size(), false);
+    addSmeared(schedule, time, derived.cutoff, smeared);
+    widen(time, smeared, derived.cutoff, schedule);
+    CentroidalChange change = internal::distanceToFeasible(
+        *split_, swept.parts, swept.analysis, schedule, settings_.filter,
+        near_jumps_ || derived.unsure, workspace_.workers);
+    verdict.weighDistance(change, settings_.verdict);
+    return change;
+  }
+
   // Looks for seats where more is missing than who leans lacks.
   std::vector<Seat> findSeats(const ContactInference& inference, const SweptMotion& swept,
                               const MotionVerdict& verdict) const {
@@ -490,6 +529,7 @@ class MotionExaminer::Workspace::Pipeline {
     makeRelative(found.inference.ground_velocity, swept.parts);
     distribute(found.inference, swept);
     MotionVerdict verdict = judge(derived, found.inference, swept);
+    weighDistance(derived, found.inference, swept, verdict);
     MotionStatistics statistics =
         summarizeMotion(workspace_.robot, derived.motion,
                         internal::gatherParts(workspace_.robot, *split_, swept.contacts,

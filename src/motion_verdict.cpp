@@ -32,26 +32,28 @@ constexpr Eigen::Index kJumpFrames = 2;
 
 // What is to be said of a fault, in the order of MotionFault.
 struct Description {
+  bool is_mendable;
   const char* code;
   FaultLimit VerdictSettings::*limit;
   const char* unit;
   const char* meaning;
 };
 constexpr Description kDescriptions[kMotionFaults] = {
-    {"downward_normal", &VerdictSettings::downward_normal, "rad",
+    {false, "downward_normal", &VerdictSettings::downward_normal, "rad",
      "an active contact's normal points down, out of the robot"},
-    {"residual_force", &VerdictSettings::residual_force, "m g",
+    {true, "residual_force", &VerdictSettings::residual_force, "m g",
      "the contacts cannot give the force"},
-    {"residual_torque", &VerdictSettings::residual_torque, "m g m",
+    {true, "residual_torque", &VerdictSettings::residual_torque, "m g m",
      "the contacts cannot give the moment"},
-    {"cop_outside", &VerdictSettings::cop_outside, "m",
+    {true, "cop_outside", &VerdictSettings::cop_outside, "m",
      "the centre of pressure is needed outside what carries"},
-    {"flight_with_support_needed", &VerdictSettings::flight_with_support_needed, "m g",
+    {true, "flight_with_support_needed", &VerdictSettings::flight_with_support_needed, "m g",
      "no contact is active, but the motion needs support"},
-    {"ground_penetration", &VerdictSettings::ground_penetration, "m",
+    {true, "ground_penetration", &VerdictSettings::ground_penetration, "m",
      "a contact is below the ground"},
-    {"foot_sliding", &VerdictSettings::foot_sliding, "m/s", "an active contact slides"},
-    {"discontinuity", &VerdictSettings::discontinuity, "of the greatest speed", "the motion jumps"},
+    {true, "foot_sliding", &VerdictSettings::foot_sliding, "m/s", "an active contact slides"},
+    {false, "discontinuity", &VerdictSettings::discontinuity, "of the greatest speed",
+     "the motion jumps"},
 };
 
 // What else settings have: the name, where it is, and whether it may be 0.
@@ -68,6 +70,8 @@ constexpr Number kNumbers[] = {
     {"jump_time", &VerdictSettings::jump_time, true},
     {"minimal_window", &VerdictSettings::minimal_window, true},
     {"interruption", &VerdictSettings::interruption, true},
+    {"repairable_distance", &VerdictSettings::repairable_distance, false},
+    {"repairable_largest_distance", &VerdictSettings::repairable_largest_distance, false},
 };
 
 const Description& describe(MotionFault fault) {
@@ -199,10 +203,14 @@ const char* getUnit(MotionFault fault) { return describe(fault).unit; }
 
 const char* getMeaning(MotionFault fault) { return describe(fault).meaning; }
 
+bool isMendable(MotionFault fault) { return describe(fault).is_mendable; }
+
 const char* to_string(MotionOutcome outcome) {
   switch (outcome) {
     case MotionOutcome::Feasible:
       return "feasible";
+    case MotionOutcome::Repairable:
+      return "repairable";
     case MotionOutcome::NotFeasible:
       return "not feasible";
     case MotionOutcome::Unknown:
@@ -262,6 +270,16 @@ std::ostream& operator<<(std::ostream& out, const VerdictSettings& settings) {
 
 const MotionFinding& MotionVerdict::operator[](MotionFault fault) const {
   return findings[static_cast<std::size_t>(fault)];
+}
+
+void MotionVerdict::weighDistance(const CentroidalChange& distance,
+                                  const VerdictSettings& settings) {
+  if (outcome != MotionOutcome::NotFeasible || !distance.converged) return;
+  for (std::size_t k = 0; k < kMotionFaults; ++k)
+    if (findings[k].holds && !isMendable(static_cast<MotionFault>(k))) return;
+  if (distance.rms <= settings.repairable_distance &&
+      distance.largest <= settings.repairable_largest_distance)
+    outcome = MotionOutcome::Repairable;
 }
 
 double MotionVerdict::getSeverity() const {

@@ -72,6 +72,21 @@ std::vector<double> numbersOf(const MotionExamination& found) {
   return numbers;
 }
 
+/// A schedule around whose flights contacts are active that are so within some frames.
+ContactSchedule widen(ContactSchedule schedule, Index width) {
+  const ContactSchedule::Matrix active = schedule.active;
+  const Index frames = active.cols();
+  for (Index edge = 1; edge < frames; ++edge) {
+    if (active.col(edge).any() == active.col(edge - 1).any()) continue;
+    for (Index frame = edge - 1 - width; frame <= edge + width; ++frame)
+      for (Index other = frame - width; other <= frame + width; ++other)
+        if (frame >= 0 && frame < frames && other >= 0 && other < frames)
+          for (Index k = 0; k < active.rows(); ++k)
+            if (active(k, other)) schedule.active(k, frame) = true;
+  }
+  return schedule;
+}
+
 bool sameBits(const std::vector<double>& one, const std::vector<double>& other) {
   return one.size() == other.size() &&
          std::memcmp(one.data(), other.data(), one.size() * sizeof(double)) == 0;
@@ -157,10 +172,91 @@ BOOST_AUTO_TEST_CASE(an_examination_is_its_steps) {
     BOOST_TEST(found.missing_support->force <=
                std::max(found.verdict[MotionFault::ResidualForce].worst,
                         found.verdict[MotionFault::FlightWithSupportNeeded].worst));
+    const CentroidalChange change = distanceToFeasible(
+        split, motions, parts, widen(inference.schedule, 4), settings.filter, derived.unsure);
+    BOOST_TEST_REQUIRE(found.distance.has_value());
+    BOOST_TEST(close(found.distance->com, change.com, 1e-9));
+    BOOST_TEST(change.largest > 0.01);
     // Something is out of reach, and something is not.
     BOOST_TEST(statistics.share(DistributionStatus::Solved) > 0.1);
     BOOST_TEST(statistics.share(DistributionStatus::Relaxed) > 0.05);
   }
+}
+
+BOOST_AUTO_TEST_CASE(around_flights_contacts_push_a_little_earlier_and_later) {
+  // It stands still, but is said to be in the air for a while: there it would have to fall.
+  const Clips clips;
+  RecordedMotion recorded = clips.make(0, 300);
+  recorded.q = restState(clips.model).q.replicate(1, 300);
+  recorded.schedule->active.setConstant(true);
+  ExaminationSettings settings;
+  settings.cutoff = 9.6;
+  settings.filter.reach = settings.filter.change = 1e-6;
+  const auto examine = [&](Index flight) {
+    recorded.schedule->active.middleCols(150, flight).setConstant(false);
+    return examineMotion(clips.robot, recorded, settings);
+  };
+  // Half a period of the cut-off is a little more than five frames: both sides bridge ten.
+  const MotionExamination bridged = examine(10);
+  BOOST_TEST(bridged.verdict.unsure.segment(150, 10).all());
+  BOOST_TEST_REQUIRE(bridged.distance.has_value());
+  BOOST_TEST(bridged.distance->largest == 0.);
+  // Of twenty, ten remain: a tenth of a second of free fall, and two without a filter.
+  const MotionExamination falling = examine(20);
+  BOOST_TEST_REQUIRE(falling.distance.has_value());
+  BOOST_TEST(falling.distance->largest > 0.002);
+  settings.cutoff = 0.;
+  const MotionExamination all = examine(20);
+  BOOST_TEST_REQUIRE(all.distance.has_value());
+  BOOST_TEST(all.distance->largest > falling.distance->largest);
+  // In the flight that remains, the CoM is on a parabola.
+  const auto height = falling.distance->com.row(2);
+  for (Index frame = 156; frame < 164; ++frame)
+    BOOST_TEST(
+        close((height[frame - 1] - 2. * height[frame] + height[frame + 1]) * 1e4, -9.81, 1e-2));
+}
+
+BOOST_AUTO_TEST_CASE(the_distance_may_be_left_out_and_makes_motions_repairable) {
+  const Clips clips;
+  const RecordedMotion recorded = clips.make(2);
+  ExaminationSettings settings;
+  settings.cutoff = 6.;
+  settings.sensitivity = true;
+  const MotionExamination found = examineMotion(clips.robot, recorded, settings);
+  BOOST_TEST_REQUIRE(found.distance.has_value());
+  const double rms = found.distance->rms, largest = found.distance->largest;
+  BOOST_TEST(close(rms, std::sqrt(found.distance->com.squaredNorm() / 600.)));
+  BOOST_TEST(close(largest, found.distance->com.col(found.distance->frame).norm()));
+  BOOST_TEST((found.verdict.outcome == MotionOutcome::NotFeasible));
+
+  settings.distance = false;
+  settings.verdict.repairable_distance = settings.verdict.repairable_largest_distance = 10.;
+  const MotionExamination without = examineMotion(clips.robot, recorded, settings);
+  BOOST_TEST(!without.distance.has_value());
+  BOOST_TEST((without.verdict.outcome == MotionOutcome::NotFeasible));
+  BOOST_TEST(sameBits(numbersOf(without), numbersOf(found)));
+
+  settings.distance = true;
+  const MotionExamination near = examineMotion(clips.robot, recorded, settings);
+  BOOST_TEST((near.verdict.outcome == MotionOutcome::Repairable));
+  BOOST_TEST(near.verdict.getCodes() == found.verdict.getCodes());
+  BOOST_TEST_REQUIRE(near.sensitivity.size() == 2u);
+  for (const CutoffSensitivity& other : near.sensitivity)
+    BOOST_TEST((other.verdict.outcome != MotionOutcome::NotFeasible));
+  for (const double part : {0.99, 1.01}) {
+    settings.verdict.repairable_distance = part * rms;
+    BOOST_TEST((examineMotion(clips.robot, recorded, settings).verdict.outcome ==
+                (part < 1. ? MotionOutcome::NotFeasible : MotionOutcome::Repairable)));
+  }
+
+  // Of what cannot be judged, nothing is said.
+  RecordedMotion shorter = clips.make(2, 3);
+  BOOST_TEST(
+      (examineMotion(clips.robot, shorter, settings).verdict.outcome == MotionOutcome::Unknown));
+  BOOST_TEST(!examineMotion(clips.robot, shorter, settings).distance.has_value());
+  settings.filter.window = 0.;
+  BOOST_TEST(throws<std::invalid_argument>([&] { examineMotion(clips.robot, recorded, settings); },
+                                           {"CentroidalFilterSettings.window", "> 0"}));
 }
 
 BOOST_AUTO_TEST_CASE(what_is_recorded_says_how_sure_it_is) {

@@ -429,6 +429,54 @@ BOOST_AUTO_TEST_CASE(normals_point_up_or_down_while_they_carry) {
   BOOST_TEST(std::isnan(normals[1].downward_share));
 }
 
+BOOST_AUTO_TEST_CASE(what_is_close_to_a_feasible_motion_is_repairable) {
+  const auto weigh = [](const Stand& stand, double rms, double largest, bool converged = true) {
+    MotionVerdict verdict = stand.judge();
+    CentroidalChange change;
+    change.rms = rms;
+    change.largest = largest;
+    change.converged = converged;
+    verdict.weighDistance(change, stand.settings);
+    return verdict.outcome;
+  };
+  Stand pulled;
+  pulled.motion.a.row(2).setConstant(-12.);
+  BOOST_TEST(holdsAlone(pulled.judge(), MotionFault::ResidualForce, 100, 12. / 9.81 - 1., 0.));
+  BOOST_TEST((weigh(pulled, 0.01, 0.05) == MotionOutcome::Repairable));
+  BOOST_TEST((weigh(pulled, 0.0101, 0.05) == MotionOutcome::NotFeasible));
+  BOOST_TEST((weigh(pulled, 0.01, 0.0501) == MotionOutcome::NotFeasible));
+  BOOST_TEST((weigh(pulled, 0.01, 0.05, false) == MotionOutcome::NotFeasible));
+  pulled.settings.repairable_distance = 0.3;
+  pulled.settings.repairable_largest_distance = 0.4;
+  BOOST_TEST((weigh(pulled, 0.3, 0.4) == MotionOutcome::Repairable));
+
+  // A repairable motion is no feasible one, and what speaks against it stays.
+  MotionVerdict verdict = pulled.judge();
+  verdict.weighDistance(CentroidalChange(), pulled.settings);
+  BOOST_TEST((verdict.outcome == MotionOutcome::Repairable));
+  BOOST_TEST(!verdict.isFeasible());
+  BOOST_TEST(verdict.getCodes().at(0) == "residual_force");
+  BOOST_TEST(verdict.getSeverity() == 1.);
+
+  // However far a feasible motion or an unknown one is said to be, they stay what they are.
+  BOOST_TEST((weigh(Stand(), 1., 1.) == MotionOutcome::Feasible));
+  BOOST_TEST((weigh(Stand(), 0., 0.) == MotionOutcome::Feasible));
+  Stand unsure;
+  unsure.unsure.setConstant(100, true);
+  BOOST_TEST((weigh(unsure, 0., 0.) == MotionOutcome::Unknown));
+
+  // No displacement mends a jump, nor a robot whose normals point down.
+  Stand jumping = pulled;
+  jumping.recorded.q.row(0).tail(20).array() += 3.;
+  BOOST_TEST(jumping.judge()[MotionFault::Discontinuity].holds);
+  BOOST_TEST((weigh(jumping, 0., 0.) == MotionOutcome::NotFeasible));
+  for (std::size_t k = 0; k < kMotionFaults; ++k) {
+    const auto fault = static_cast<MotionFault>(k);
+    BOOST_TEST(isMendable(fault) ==
+               (fault != MotionFault::DownwardNormal && fault != MotionFault::Discontinuity));
+  }
+}
+
 BOOST_AUTO_TEST_CASE(severity_is_the_largest_share_of_what_holds) {
   MotionVerdict verdict = {};
   verdict.unsure.setConstant(20, false);
@@ -447,6 +495,7 @@ BOOST_AUTO_TEST_CASE(codes_settings_and_sizes) {
   BOOST_TEST(getUnit(MotionFault::CoPOutside) == std::string("m"));
   BOOST_TEST(getMeaning(MotionFault::FootSliding) == std::string("an active contact slides"));
   BOOST_TEST(to_string(MotionOutcome::NotFeasible) == std::string("not feasible"));
+  BOOST_TEST(to_string(MotionOutcome::Repairable) == std::string("repairable"));
   const auto refused = [&](auto change, std::initializer_list<std::string> words) {
     Stand stand;
     change(stand);
@@ -460,6 +509,10 @@ BOOST_AUTO_TEST_CASE(codes_settings_and_sizes) {
           {"VerdictSettings.discontinuity.allowed_share", "1.5"});
   refused([](auto& s) { s.settings.cop_force = 1. / 0.; }, {"VerdictSettings.cop_force", "inf"});
   refused([](auto& s) { s.settings.joint_speed = 0.; }, {"VerdictSettings.joint_speed", "> 0"});
+  refused([](auto& s) { s.settings.repairable_distance = 0.; },
+          {"VerdictSettings.repairable_distance", "> 0"});
+  refused([](auto& s) { s.settings.repairable_largest_distance = kNaN; },
+          {"VerdictSettings.repairable_largest_distance", "nan"});
   refused([](auto& s) { s.recorded.q.conservativeResize(7, 99); }, {"recorded.q", "100", "99"});
   refused([](auto& s) { s.ground.resize(1, 1); }, {"ground", "2", "1"});
   refused([](auto& s) { s.ground.setZero(2, 99); }, {"ground", "100", "99"});

@@ -27,6 +27,9 @@ struct DYNACOM_EXPORT ExaminationSettings {
   /// Links that may touch the ground besides the contacts, of findCollisionPoints(); they are
   /// looked at where the contacts alone cannot give what the motion needs.
   std::vector<BodyPoints> bodies = {};
+  /// Whether to find how far the motion is from a feasible one, and how.
+  bool distance = true;
+  CentroidalFilterSettings filter = {};
   /// Whether to judge the motion with half and twice the cut-off, too, where a filter is needed and
   /// takes them.
   bool sensitivity = false;
@@ -79,6 +82,10 @@ struct MotionExamination {
   MotionAnalysis analysis;  ///< gatherParts()
   MotionVerdict verdict;
   std::optional<MissingSupport> missing_support;
+  /// distanceToFeasible(), where the settings ask for it, the verdict is not Unknown and no frame
+  /// is too large for numbers. Nothing is asked of frames near jumps and near ends that are unsure;
+  /// around flights, contacts count that are active within half a period of the cut-off.
+  std::optional<CentroidalChange> distance;
   MotionStatistics statistics;
   std::vector<CutoffSensitivity> sensitivity;  ///< with half, and with twice the cut-off
 };

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "dynacom/centroidal_filter.hpp"
 #include "dynacom/motion_analysis.hpp"
 #include "dynacom/recorded_motion.hpp"
 
@@ -51,6 +52,10 @@ DYNACOM_EXPORT const char* getUnit(MotionFault fault);
 /// What the fault means, such as "the contacts cannot give the force".
 DYNACOM_EXPORT const char* getMeaning(MotionFault fault);
 
+/// Whether a small change of the motion mends the fault: not where it is the robot's description
+/// that is wrong, or frames do not belong together.
+DYNACOM_EXPORT bool isMendable(MotionFault fault);
+
 /// From where on a fault is one.
 struct FaultLimit {
   double limit;          ///< of what is measured in a frame
@@ -94,6 +99,11 @@ struct DYNACOM_EXPORT VerdictSettings {
   /// Interruptions of a window that are shorter than this are none where there is as much time
   /// without fault before and after them, ≥ 0 [s].
   double interruption = 0.1;
+  /// A motion that is not feasible is repairable if the CoM has to be displaced by no more than
+  /// this, root mean square over the frames, and by no more than the second in any, > 0 [m]; see
+  /// distanceToFeasible(). Well retargeted clips need 0.2 to 4 mm, kicks and sprints up to 10;
+  /// three joints mixed up 16, a robot that leans 5 cm too far 50.
+  double repairable_distance = 0.01, repairable_largest_distance = 0.05;
 
   const FaultLimit& operator[](MotionFault fault) const;
   FaultLimit& operator[](MotionFault fault);
@@ -136,11 +146,12 @@ struct ContactNormal {
 /// What came out.
 enum class MotionOutcome {
   Feasible,     ///< No fault holds.
+  Repairable,   ///< Only faults hold that are mendable, and a feasible motion is near.
   NotFeasible,  ///< A fault holds.
   Unknown,      ///< Nothing can be said: there are too few frames whose accelerations are known.
 };
 
-/// "feasible", "not feasible" or "unknown".
+/// "feasible", "repairable", "not feasible" or "unknown".
 DYNACOM_EXPORT const char* to_string(MotionOutcome outcome);
 
 /// Whether a motion is feasible, and what speaks against it.
@@ -154,6 +165,9 @@ struct DYNACOM_EXPORT MotionVerdict {
   std::vector<ContactNormal> normals;  ///< of each contact of the robot
 
   const MotionFinding& operator[](MotionFault fault) const;
+  /// Lets NotFeasible be Repairable, where only mendable faults hold and the distance to feasible
+  /// is known and within what settings allow.
+  void weighDistance(const CentroidalChange& distance, const VerdictSettings& settings);
   /// The largest share of frames beyond the limit of a fault that holds; 0 if none does.
   double getSeverity() const;
   bool isFeasible() const { return outcome == MotionOutcome::Feasible; }

@@ -7,6 +7,8 @@ A settings file is YAML; what it does not name stays at its default::
     omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
     flat: true            # the ground is flat and horizontal: see the CoP
     feet_only: false      # nothing but the contacts of the robot file may touch the ground
+    distance: true        # how far is the motion from a feasible one?
+    filter: {com: 0.01}   # CentroidalFilterSettings, field by field: how that is found
     detection:            # DetectionSettings, field by field
       ground_height: null # [m]; null if it is to be found
       ground_velocity: [-1.0, 0.0, 0.0] # a treadmill's [m/s]; null if it is to be found
@@ -24,12 +26,15 @@ from typing import Any, Literal
 import numpy as np
 
 from dynacom.dynacom_pywrap import (
+    CentroidalFilterSettings,
     DetectionSettings,
     FaultLimit,
     VerdictSettings,
     kAutomaticCutoff,
 )
 from dynacom.errors import DynacomError
+from dynacom.presets import preset_values
+from dynacom.robots import Robot
 from dynacom.yaml_file import is_number, parse_yaml, read_yaml
 
 #: What a cut-off is called that suits the motion.
@@ -48,6 +53,8 @@ class AnalysisOptions:
         flat: whether the centre of pressure is that of flat horizontal ground.
         feet_only: whether nothing but the robot's contacts may touch the ground; else its links
             may, too, where contacts do not suffice.
+        distance: whether to find how far motions are from feasible ones.
+        filter: how that is found, see ``distanceToFeasible``.
         detection: how contacts are found, see ``inferContacts``.
         verdict: limits of the verdict, see ``judgeMotion``.
     """
@@ -56,6 +63,8 @@ class AnalysisOptions:
     omega: float = 0.0
     flat: bool = True
     feet_only: bool = False
+    distance: bool = True
+    filter: CentroidalFilterSettings = field(default_factory=CentroidalFilterSettings)
     detection: DetectionSettings = field(default_factory=DetectionSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
 
@@ -69,6 +78,7 @@ class AnalysisOptions:
             raise ValueError(f"cutoff must be finite and >= 0 Hz, {AUTO} or none, got {cutoff:g}")
         if not (math.isfinite(self.omega) and self.omega >= 0.0):
             raise ValueError(f"omega must be finite and >= 0 rad/s, got {self.omega:g}")
+        self.filter.validate()
         self.detection.validate()
         self.verdict.validate()
 
@@ -93,6 +103,17 @@ class AnalysisOptions:
         content = read_yaml(path)
         self.update({} if content is None else content, str(path))
 
+    def update_from_preset(self, name: str, robot: Robot) -> None:
+        """Changes limits of the verdict to those of a preset, see docs/verdict.md.
+
+        Args:
+            robot: whose mass makes newtons parts of the weight.
+
+        Raises:
+            DynacomError: there is no preset of that name, or the robot does not suit it.
+        """
+        self.update(preset_values(name, robot), f"preset {name}")
+
     def update_from_texts(self, texts: Iterable[str]) -> None:
         """Changes settings by texts like ``verdict.residual_force.limit=0.2``.
 
@@ -115,7 +136,12 @@ class AnalysisOptions:
 
     def _update(self, changes: list[tuple[Any, str]], where: str) -> None:
         # What is in range depends on other settings: it is looked at when all have been changed.
-        changed = replace(self, detection=self.detection.copy(), verdict=self.verdict.copy())
+        changed = replace(
+            self,
+            filter=self.filter.copy(),
+            detection=self.detection.copy(),
+            verdict=self.verdict.copy(),
+        )
         for values, place in changes:
             _update(changed, values, place)
         try:
@@ -135,7 +161,13 @@ class AnalysisOptions:
         return _to_dict(self)
 
 
-_GROUPS = (AnalysisOptions, DetectionSettings, VerdictSettings, FaultLimit)
+_GROUPS = (
+    AnalysisOptions,
+    CentroidalFilterSettings,
+    DetectionSettings,
+    VerdictSettings,
+    FaultLimit,
+)
 
 
 def _names(group: Any) -> list[str]:

@@ -14,10 +14,13 @@ from dynacom.motion_report import FAULTS
 
 # So many of the worst clips, and of those that could not be judged, are told one by one.
 _LISTED = 200
+# From the best to the worst.
+_VERDICTS = ("feasible", "unknown", "repairable", "not feasible")
 _COLUMNS = (
     *("file", "clip", "status", "error", "verdict", "codes", "severity", "feasible_share"),
     *("frames", "duration"),
     *("mean_vertical_force", "residual_force_rms", "residual_torque_rms"),
+    *("distance_rms", "distance_max"),
     *(f"{code}.{column}" for code in FAULTS for column in ("holds", "frames", "worst")),
 )
 
@@ -26,10 +29,9 @@ _COLUMNS = (
 class Overview:
     """Counts, and the worst."""
 
-    #: Of clips.
-    feasible: int = 0
-    not_feasible: int = 0
-    unknown: int = 0
+    #: Verdict -> clips that have it; all verdicts, from the best to the worst.
+    verdicts: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(_VERDICTS, 0)))
+    #: Clips that could not be judged.
     errors: int = 0
     #: Code -> clips in which the fault holds; all codes.
     codes: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(FAULTS, 0)))
@@ -51,7 +53,7 @@ class Overview:
     @property
     def judged(self) -> int:
         """All of them, but for errors."""
-        return self.feasible + self.not_feasible + self.unknown
+        return self.verdicts.total()
 
 
 def overview(table: Path, listed: int = _LISTED) -> Overview:
@@ -75,9 +77,7 @@ def _judged(table: Path, found: Overview, listed: int) -> Iterator[Row]:
                 if len(found.failed) < listed:
                     found.failed.append(row)
                 continue
-            found.feasible += row["verdict"] == "feasible"
-            found.not_feasible += row["verdict"] == "not feasible"
-            found.unknown += row["verdict"] == "unknown"
+            found.verdicts[row["verdict"]] += 1
             found.feasible_frames += row["feasible_share"] * row["frames"]
             found.codes.update(code for code in row["codes"] if code in FAULTS)
             found.frames += row["frames"]
@@ -86,5 +86,4 @@ def _judged(table: Path, found: Overview, listed: int) -> Iterator[Row]:
 
 
 def _badness(row: Row) -> tuple[int, float, float]:
-    verdicts = ("feasible", "unknown", "not feasible")
-    return verdicts.index(row["verdict"]), row["severity"], row["residual_force_rms"]
+    return _VERDICTS.index(row["verdict"]), row["severity"], row["residual_force_rms"]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """The page of a batch: one HTML file that needs nothing else, no network either."""
 
+import math
 from collections.abc import Iterable, Mapping
 from html import escape
 from pathlib import Path
@@ -19,7 +20,8 @@ _PAGE = Template("""<!DOCTYPE html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>$clips clips of $robot</title>
 <style>
-:root { color-scheme: light dark; --line: #8884; --ok: #2a8a4a; --bad: #c8382e; --err: #8a6d1d; }
+:root { color-scheme: light dark; --line: #8884; --ok: #2a8a4a; --bad: #c8382e;
+  --mid: #e08a00; --err: #8a6d1d; }
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2rem auto; max-width: 72rem;
   padding: 0 1rem; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
@@ -33,7 +35,7 @@ td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
 .sortable td:nth-child(3) { overflow-wrap: break-word; min-width: 16rem; }
 .bars td:first-child { width: 28rem; } .bars td.n { width: 8rem; white-space: nowrap; }
 .bar { height: .9rem; min-width: 1px; background: var(--bad); border-radius: 2px; }
-.ok { background: var(--ok); } .err { background: var(--err); }
+.ok { background: var(--ok); } .mid { background: var(--mid); } .err { background: var(--err); }
 th button { font: inherit; font-weight: 600; text-align: inherit; background: none; border: 0;
   padding: 0; color: inherit; cursor: pointer; }
 th[aria-sort=ascending] button::after { content: " \\2191"; }
@@ -90,9 +92,10 @@ def write_index(
         DynacomError: it cannot be written.
     """
     verdicts = (
-        ("feasible", found.feasible, "ok"),
-        ("not feasible", found.not_feasible, ""),
-        ("unknown: too short", found.unknown, "err"),
+        ("feasible", found.verdicts["feasible"], "ok"),
+        ("repairable", found.verdicts["repairable"], "mid"),
+        ("not feasible", found.verdicts["not feasible"], ""),
+        ("unknown: too short", found.verdicts["unknown"], "err"),
         ("error", found.errors, "err"),
     )
     reasons = ((f"{code}: {FAULTS[code][1]}", n, "") for code, n in found.codes.most_common())
@@ -149,6 +152,8 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
             f"<td>{_reasons(row)}</td>"
             + _number(row["severity"], f"{row['severity']:.1%}")
             + _number(row["feasible_share"], f"{row['feasible_share']:.1%}")
+            + _distance(row["distance_rms"])
+            + _distance(row["distance_max"])
             + _number(row["residual_force_rms"])
             + _number(row["residual_torque_rms"])
             + _number(row["mean_vertical_force"])
@@ -161,6 +166,8 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
         ("Reasons", ""),
         ("Frames at fault", "n"),
         ("In windows", "n"),
+        ("Distance RMS [mm]", "n"),
+        ("Distance at most [mm]", "n"),
         ("Residual force RMS [m g]", "n"),
         ("Residual moment RMS [m g m]", "n"),
         ("Mean vertical force [m g]", "n"),
@@ -200,6 +207,10 @@ def _table(titles: Iterable[tuple[str, str]], rows: list[str]) -> str:
         f'<table class="sortable"><thead><tr>{heads}</tr></thead>'
         f"<tbody>{''.join(rows)}</tbody></table>"
     )
+
+
+def _distance(metres: float | None) -> str:
+    return _number(math.nan, "–") if metres is None else _number(1e3 * metres)
 
 
 def _number(value: float, text: str | None = None) -> str:

@@ -69,6 +69,8 @@ _COLUMNS = (
     ("momentum_change", "double", "m g"),
     ("residual_force_rms", "double", "m g"),
     ("residual_torque_rms", "double", "m g m"),
+    ("distance_rms", "double", "m"),
+    ("distance_max", "double", "m"),
     ("solved_share", "double", ""),
     ("relaxed_share", "double", ""),
     ("no_contact_share", "double", ""),
@@ -369,6 +371,8 @@ def _report_row(report: MotionReport, name: str) -> Row:
         "seats": seat_statistics(found),
         "dynacom": __version__,
     }
+    if (distance := found.distance) is not None:
+        row |= {"distance_rms": distance.rms, "distance_max": distance.largest}
     for column in _STATISTICS:
         row[column] = getattr(statistics, column)
     for status, column in _STATUSES.items():

@@ -2,8 +2,8 @@
 """The command ``dynacom``.
 
 Exit status 0 when what was asked for was done, whatever came out; 1 where ``--check`` asked whether
-a motion is feasible, and it is not, or nobody knows; 2 for bad input, which one line on stderr
-explains.
+a motion is feasible, or at least repairable, and it is not, or nobody knows; 2 for bad input, which
+one line on stderr explains.
 """
 
 import functools
@@ -13,10 +13,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
+from typer.core import TyperCommand
 
 import dynacom
 from dynacom.errors import DynacomError
@@ -174,6 +176,21 @@ class _Request:
             help="Natural frequency of VRP and DCM [rad/s]; 0 for that of the CoM's mean height.",
         ),
     ] = None
+    distance: Annotated[
+        bool | None,
+        typer.Option(
+            "--distance/--no-distance",
+            help="Find how far motions are from feasible ones? None is repairable without.",
+        ),
+    ] = None
+    preset: Annotated[
+        str | None,
+        typer.Option(
+            "--preset",
+            metavar="hicks|opensim|strict",
+            help="Limits that others have published, see docs/verdict.md.",
+        ),
+    ] = None
     settings: Annotated[
         Path | None,
         typer.Option("--settings", metavar="FILE.yaml", help="Settings, see docs/verdict.md."),
@@ -206,12 +223,19 @@ class _Request:
             robot = robot.with_payload(*parse_payload(text))
         return robot if self.gravity is None else robot.with_gravity(self.gravity)
 
-    def make_options(self) -> "dynacom.AnalysisOptions":
+    def make_options(self, robot: "dynacom.Robot") -> "dynacom.AnalysisOptions":
         options = dynacom.AnalysisOptions()
+        if self.preset is not None:
+            options.update_from_preset(self.preset, robot)
         if self.settings is not None:
             options.update_from_file(self.settings)
         options.update_from_texts(self.set_ or [])
-        values = {"cutoff": _parse_cutoff(self.cutoff), "flat": self.flat, "omega": self.omega}
+        values = {
+            "cutoff": _parse_cutoff(self.cutoff),
+            "flat": self.flat,
+            "omega": self.omega,
+            "distance": self.distance,
+        }
         given = {name: value for name, value in values.items() if value is not None}
         if self.feet_only:
             given["feet_only"] = True
@@ -247,7 +271,8 @@ class _ClipRequest(_Request):
 
     def analyze(self, clip: Path) -> "dynacom.MotionReport":
         """Judges the motion, with a progress bar."""
-        robot, options = self.load_robot(), self.make_options()
+        robot = self.load_robot()
+        options = self.make_options(robot)
         with _progress() as progress:
             return dynacom.analyze(
                 clip,
@@ -290,7 +315,23 @@ def _with_options(function: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-@app.command()
+# What ``--check`` may ask for: the verdicts that pass.
+_CHECKS = {"feasible": ("feasible",), "repairable": ("feasible", "repairable")}
+
+
+class _AnalyzeCommand(TyperCommand):
+    """A command whose option ``--check`` may stand without its value, which is then feasible."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        given = []
+        for argument, following in zip_longest(args, args[1:]):
+            given.append(argument)
+            if argument == "--check" and following not in _CHECKS:
+                given.append("feasible")
+        return super().parse_args(ctx, given)
+
+
+@app.command(cls=_AnalyzeCommand)
 @_with_options
 def analyze(
     request: _ClipRequest,
@@ -308,8 +349,13 @@ def analyze(
         bool, typer.Option("--page/--no-page", help="Write report.html? It takes the longest.")
     ] = True,
     check: Annotated[
-        bool, typer.Option("--check", help="Exit with status 1 unless the motion is feasible.")
-    ] = False,
+        str | None,
+        typer.Option(
+            "--check",
+            metavar="[feasible|repairable]",
+            help="Exit with status 1 unless the motion is feasible, or at least repairable.",
+        ),
+    ] = None,
 ) -> None:
     """Judge a motion: is it physically possible, when not and why, what do the feet feel?
 
@@ -319,6 +365,8 @@ def analyze(
 
     from dynacom.summary import summary_table
 
+    if check not in (None, *_CHECKS):
+        raise DynacomError(f"check must be {' or '.join(_CHECKS)}, got '{check}'")
     report = request.analyze(clip)
     name = Path(clip.name.removesuffix(".gz")).stem
     with Console(stderr=True).status("Writing the results", spinner="line"):
@@ -327,7 +375,7 @@ def analyze(
     console.print(summary_table(report.summary))
     for file in files:
         console.print(f"Wrote {file}", highlight=False, markup=False, soft_wrap=True)
-    if check and not report.verdict.feasible:
+    if check is not None and report.verdict.outcome not in _CHECKS[check]:
         raise typer.Exit(1)
 
 
@@ -402,13 +450,15 @@ def batch(
         state = now
         show(now)
 
+    robot = request.load_robot()
+    options = request.make_options(robot)
     try:
         with _batch_progress() as show:
             found = run_batch(
                 paths,
-                request.load_robot(),
+                robot,
                 out,
-                options=request.make_options(),
+                options=options,
                 **request.reading(),
                 engine=engine,
                 jobs=jobs,

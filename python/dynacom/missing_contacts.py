@@ -14,8 +14,6 @@ from dynacom.dynacom_pywrap import (
     MotionStatistics,
 )
 
-#: What forces are compared with in verdicts, whatever gravity is [m/s^2].
-STANDARD_GRAVITY = 9.81
 # So many intervals are told one by one.
 _LISTED = 3
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynacom.analysis_options import AUTO, AnalysisOptions
+from dynacom.distance import distance_arrays, distance_summary
 from dynacom.dynacom_pywrap import (
     ContactSchedule,
     CutoffSensitivity,
@@ -31,11 +32,11 @@ from dynacom.dynacom_pywrap import (
     kThinnedRate,
 )
 from dynacom.errors import DynacomError
-from dynacom.missing_contacts import STANDARD_GRAVITY, missing_summary, missing_texts, unexplained
+from dynacom.missing_contacts import missing_summary, missing_texts, unexplained
 from dynacom.motion_file import Clip, read_motion
 from dynacom.other_contacts import body_statistics, body_texts, seat_statistics
 from dynacom.results_folder import results_folder
-from dynacom.robots import Robot, load_robot
+from dynacom.robots import STANDARD_GRAVITY, Robot, load_robot
 from dynacom.schedule_file import read_schedule, write_schedule
 from dynacom.terrain import ground_heights, terrain_texts
 
@@ -70,6 +71,8 @@ _FRAME_COLUMNS = (
     ("residual", _WRENCH, _WRENCH_UNITS),
     ("feasible_acom", _XYZ, "m/s^2"),
     ("feasible_dam", _XYZ, "N m"),
+    ("distance", ("",), "m"),
+    ("feasible_com", _XYZ, "m"),
 )
 _CONTACT_COLUMNS = (
     ("active", ("",), ""),
@@ -331,6 +334,8 @@ def make_examiner(
         sensitivity,
         # A robot without contacts is not to stand on links of which nobody has said anything.
         bodies=[] if options.feet_only or not robot.contacts else robot.collision_points.bodies,
+        distance=options.distance,
+        filter=options.filter,
         **others,
     )
 
@@ -407,6 +412,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         "omega": found.analysis.omega,
         "verdict": found.verdict.outcome,
         "codes": found.verdict.codes,
+        "distance": distance_summary(found),
         "reasons": _reasons(found.verdict, report.options, statistics.frames),
         "feasible_share": found.verdict.feasible_share,
         "windows": window_times(found.verdict),
@@ -607,10 +613,11 @@ def _collect_arrays(
     clip: Clip, found: MotionExamination, options: AnalysisOptions
 ) -> dict[str, np.ndarray]:
     analysis = found.analysis
-    names = [name for name, _, _ in _FRAME_COLUMNS if name not in ("status", "fault")]
-    arrays = {name: getattr(analysis, name) for name in names}
+    arrays = distance_arrays(found)
     arrays["status"] = np.array([status.name for status in analysis.status])
     arrays["fault"] = _faults_by_frame(found.verdict, options)
+    names = [name for name, _, _ in _FRAME_COLUMNS if name not in arrays]
+    arrays |= {name: getattr(analysis, name) for name in names}
     confidence = found.schedule.confidence
     ground, contacts = found.ground, found.contacts
     for index, (contact, moved) in enumerate(zip(analysis.contacts, contacts, strict=True)):

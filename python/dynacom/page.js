@@ -124,14 +124,11 @@
     return [traces, overTime([level(1, "#b3261e")])];
   }
 
-  function drawResidual(name) {
+  function drawFilled(name, title, color) {
     const limit = data.thresholds[name];
-    const more = { trace: { fill: "tozeroy", fillcolor: "rgba(179, 38, 30, 0.12)" } };
-    const shapes = limit === undefined ? [] : [level(limit, "#b3261e")];
-    return [
-      [line("residual", column(name), "#b3261e", more)],
-      overTime(shapes, { showlegend: false }),
-    ];
+    const more = { trace: { fill: "tozeroy", fillcolor: `${color}1f` } };
+    const shapes = limit === undefined ? [] : [level(limit, color)];
+    return [[line(title, column(name), color, more)], overTime(shapes, { showlegend: false })];
   }
 
   // The first and the last frame of each stretch in which something holds.
@@ -213,17 +210,24 @@
     return [traces, overTime([], more)];
   }
 
-  const plots = ["forces", "friction", "residual_force", "residual_torque", "schedule"].map(element);
-  const drawings = [
-    drawForces(), drawFriction(), drawResidual("residual_force"), drawResidual("residual_torque"),
-    drawSchedule(),
-  ];
+  const drawn = new Map([
+    ["forces", drawForces()],
+    ["friction", drawFriction()],
+    ["residual_force", drawFilled("residual_force", "residual", "#b3261e")],
+    ["residual_torque", drawFilled("residual_torque", "residual", "#b3261e")],
+  ]);
+  if (columns.has("distance"))
+    drawn.set("distance", drawFilled("distance", "distance", data.colors.feasible_com));
+  drawn.set("schedule", drawSchedule());
+  const plots = [...drawn.keys()].map(element);
+  const drawings = [...drawn.values()];
 
   // ---- From above ----
 
   const above = element("above");
-  const POINTS = { com: "CoM", cop: "CoP", vrp: "VRP" };
-  const NOW = data.contacts.length + 3; // the first of the traces that show one frame
+  const POINTS = data.points;
+  const FAINT_PATHS = Object.keys(POINTS).map((_, index) => data.contacts.length + index);
+  const NOW = data.contacts.length + FAINT_PATHS.length; // the first of those that show one frame
 
   const path = (name) => [column(`${name}_x`), column(`${name}_y`)];
   // The faint paths, which are drawn anew at every step: of some frames, where there are many.
@@ -344,7 +348,7 @@
     ];
   }
 
-  // What holds the soles and the CoM, and CoP and VRP where they are not far off.
+  // What holds the soles and the CoM, and the other points where they are not far off.
   function range(axis) {
     let [low, high] = [Infinity, -Infinity];
     const extend = (value) => {
@@ -358,7 +362,7 @@
         for (const point of corners(index, frame)) extend(point[axis]);
     const reach = 0.1 + 0.2 * (high - low);
     const [least, most] = [low - reach, high + reach];
-    for (const name of ["cop", "vrp"])
+    for (const name of Object.keys(POINTS))
       path(name)[axis].forEach((value) => extend(Math.min(Math.max(value, least), most)));
     const margin = 0.05 + 0.05 * (high - low);
     return { range: [low - margin, high + margin] };
@@ -477,7 +481,7 @@
     zoomed = range;
     for (const plot of plots) Plotly.relayout(plot, { "xaxis.range": [...range] });
     const [x, y] = faintPaths(nearest(time, range[0]), nearest(time, range[1]) + 1);
-    Plotly.restyle(above, { x, y }, [NOW - 3, NOW - 2, NOW - 1]);
+    Plotly.restyle(above, { x, y }, FAINT_PATHS);
     showCursors();
   }
 

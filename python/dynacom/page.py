@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from dynacom import scene
+from dynacom.distance import distance_text
 from dynacom.errors import DynacomError
 from dynacom.motion_report import TOO_SHORT
 from dynacom.robots import Robot
@@ -66,6 +67,7 @@ def write_page(
             }
             for number, name in enumerate(robot.contacts)
         ],
+        "points": _points(summary),
         "colors": {name: _css(color) for name, color in scene.COLORS.items()},
         "thresholds": {reason["code"]: reason["threshold"] for reason in summary["reasons"]},
         "windows": summary["windows"],
@@ -83,6 +85,7 @@ def write_page(
         measured=_measured(summary),
         key=_key(robot, summary),
         dashed="; dashed: the file's" if any(c["measured"] for c in data["contacts"]) else "",
+        distance_class="" if summary["distance"] else "none",
         scene_class="" if recording else "none",
         data=_json(data),
         # One row a column, the time in double precision.
@@ -142,6 +145,12 @@ def _parts(arrays: Mapping[str, np.ndarray], contact: str) -> list[str]:
     return [name.removesuffix(end) for name in names if name.endswith(end)]
 
 
+def _points(summary: Mapping[str, Any]) -> dict[str, str]:
+    """Whose paths are drawn: array's name -> what it is called."""
+    points = {"com": "CoM", "cop": "CoP", "vrp": "VRP"}
+    return points | ({"feasible_com": "feasible CoM"} if summary["distance"] else {})
+
+
 def _columns(
     robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
@@ -155,7 +164,9 @@ def _columns(
         "residual_torque": np.linalg.norm(arrays["residual"][:, 3:], axis=1) / weight,
         "needed": arrays["ground_force"][:, 2] / weight,
     }
-    for name in ("com", "cop", "vrp"):
+    if summary["distance"]:
+        columns["distance"] = 1e3 * arrays["distance"]
+    for name in _points(summary):
         columns[f"{name}_x"], columns[f"{name}_y"] = arrays[name].T[:2]
     for number, (name, settings) in enumerate(robot.contacts.items()):
         key = f"contact.{name}"
@@ -233,13 +244,17 @@ def _head(summary: Mapping[str, Any]) -> str:
 
 def _verdict(summary: Mapping[str, Any]) -> str:
     verdict = summary["verdict"]
-    kind = {"feasible": "good", "not feasible": "bad"}.get(verdict, "unknown")
-    held = [item for item in summary["reasons"] if item["holds"] and kind == "bad"]
+    kinds = {"feasible": "good", "repairable": "fair", "not feasible": "bad"}
+    kind = kinds.get(verdict, "unknown")
+    held = [item for item in summary["reasons"] if item["holds"] and kind != "unknown"]
     others = [item for item in summary["reasons"] if item not in held]
     parts = [
         f'<section class="verdict {kind}">',
         f"<h2>{escape(verdict[:1].upper() + verdict[1:])}</h2>",
     ]
+    if summary["distance"]:
+        text = distance_text(summary["distance"], _moment)
+        parts.append(f'<p class="caption distance">Distance: {text}</p>')
     if kind == "unknown":
         parts.append(f"<p><code>too_short</code> {escape(TOO_SHORT)}</p>")
     else:
@@ -299,7 +314,7 @@ def _dot(color: tuple[int, int, int]) -> str:
 
 def _key(robot: Robot, summary: Mapping[str, Any]) -> str:
     """What the scene's colours mean."""
-    points = {"com": "CoM", "cop": "CoP", "vrp": "VRP", "support": "support"}
+    points = _points(summary) | {"support": "support"}
     colors = {title: scene.COLORS[name] for name, title in points.items()}
     for number, name in enumerate([*robot.contacts, *summary["bodies"]]):
         colors[f"force on {name}"] = scene.contact_color(number)

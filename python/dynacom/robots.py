@@ -55,6 +55,9 @@ from dynacom.yaml_file import is_number, read_yaml
 
 ContactSettings: TypeAlias = ContactPointSettings | Contact6DSettings
 
+#: What forces are compared with in verdicts, whatever gravity is [m/s^2].
+STANDARD_GRAVITY = 9.81
+
 _FOLDER = Path(__file__).with_name("robots")
 
 

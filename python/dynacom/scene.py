@@ -22,7 +22,13 @@ from dynacom.robots import ContactSettings, Robot
 
 #: Red, green, blue of what is drawn here and in the page's plots. Kept apart by those, too, who do
 #: not see all colours (the palette of Okabe and Ito).
-COLORS = {"com": (30, 30, 30), "cop": (213, 94, 0), "vrp": (0, 114, 178), "support": (240, 228, 66)}
+COLORS = {
+    "com": (30, 30, 30),
+    "cop": (213, 94, 0),
+    "vrp": (0, 114, 178),
+    "feasible_com": (122, 81, 149),
+    "support": (240, 228, 66),
+}
 CONTACT_COLORS = ((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 
 # More frames than these make pages that are too large, and too slow to go back in.
@@ -230,7 +236,7 @@ class Scene:
         self._aim_camera(server, robot.model, q[0])
         self._robot, self.note = _draw_robot(server, robot)
         self._forces = [*self._draw_forces(robot), *self._draw_body_forces(robot, summary)]
-        self._draw_points()
+        self._draw_points(has_distance=summary["distance"] is not None)
         self.show(0)
 
     def show(self, frame: int) -> None:
@@ -242,6 +248,9 @@ class Scene:
         com = self._arrays["com"][frame]
         self._com.position = com
         self._plumb.points = np.array([[com, [com[0], com[1], self._ground]]])
+        if self._feasible_com is not None:
+            self._feasible_com.position = self._arrays["feasible_com"][frame]
+            self._feasible_com.visible = bool(self._arrays["distance"][frame] > 1e-3)
         for name, ball in self._balls.items():
             point = self._arrays[name][frame]
             ball.visible = bool(np.isfinite(point).all())
@@ -320,13 +329,14 @@ class Scene:
 
         return move
 
-    def _draw_points(self) -> None:
+    def _draw_points(self, *, has_distance: bool) -> None:
         radius = 0.035 * self._height
 
         def ball(name: str) -> Any:
             return self._scene.add_icosphere(f"{_WORLD}/{name}", radius, color=COLORS[name])
 
         self._com = ball("com")
+        self._feasible_com = ball("feasible_com") if has_distance else None
         self._balls = {name: ball(name) for name in ("cop", "vrp")}
         self._plumb = self._scene.add_line_segments(
             f"{_WORLD}/plumb", np.zeros((1, 2, 3)), COLORS["com"], thickness=0.2 * radius

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 from rich.table import Table
 
+from dynacom.distance import distance_text
 from dynacom.motion_report import TOO_SHORT
 
 if TYPE_CHECKING:
@@ -14,7 +15,12 @@ if TYPE_CHECKING:
 
 
 #: Of verdicts, where they are printed.
-VERDICT_COLORS = {"feasible": "green", "not feasible": "red", "unknown": "yellow"}
+VERDICT_COLORS = {
+    "feasible": "green",
+    "repairable": "dark_orange",
+    "not feasible": "red",
+    "unknown": "yellow",
+}
 
 
 def summary_table(summary: dict[str, Any]) -> Table:
@@ -25,6 +31,8 @@ def summary_table(summary: dict[str, Any]) -> Table:
 
     color = VERDICT_COLORS[summary["verdict"]]
     table.add_row("Verdict", f"[{color}]{summary['verdict']}[/]")
+    if summary["distance"] is not None:
+        table.add_row("Distance", distance_text(summary["distance"]))
     if summary["verdict"] == "unknown":
         table.add_row("  too_short", TOO_SHORT)
     else:
@@ -96,10 +104,9 @@ def overview_table(found: "Overview", state: "BatchProgress") -> Table:
         return f"{count} ({count / found.clips:.1%})" if found.clips else "0"
 
     table.add_row("Clips", str(found.clips))
-    table.add_row("  feasible", f"[green]{share(found.feasible)}[/]")
-    table.add_row("  not feasible", f"[red]{share(found.not_feasible)}[/]")
-    if found.unknown:
-        table.add_row("  unknown", f"[yellow]{share(found.unknown)}[/]")
+    for verdict, color in VERDICT_COLORS.items():
+        if found.verdicts[verdict] or verdict != "unknown":
+            table.add_row(f"  {verdict}", f"[{color}]{share(found.verdicts[verdict])}[/]")
     table.add_row("  errors", share(found.errors))
     table.add_section()
     for code, count in found.codes.most_common():

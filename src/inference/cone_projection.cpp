@@ -78,6 +78,15 @@ bool ConeProjection::solve() {
   return true;
 }
 
+Eigen::Vector3d ConeProjection::force(int point, const std::vector<double>& mu) const {
+  const double friction = mu[static_cast<std::size_t>(point)];
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int k = 0; k < count_; ++k)
+    if (edges_[k].point == point)
+      sum += factors_[k] * Eigen::Vector3d(edges_[k].x * friction, edges_[k].y * friction, 1.);
+  return sum;
+}
+
 double ConeProjection::lift(std::uint32_t set) const {
   double sum = 0.;
   for (int k = 0; k < count_; ++k)
@@ -106,7 +115,7 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
   }
   std::copy_n(solution_.begin(), count_, factors_.begin());
 
-  Vector6 residual;
+  Vector6& residual = residual_;
   for (int round = 0; round < kRounds; ++round) {
     residual = target_;
     for (int k = 0; k < count_; ++k) residual -= factors_[k] * columns_.col(k);
@@ -122,7 +131,8 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
       const double friction = mu[static_cast<std::size_t>(point)];
       const double value = friction * (std::abs(pull.x()) + std::abs(pull.y())) + pull.z();
       if (value <= slope) continue;
-      const Edge edge = {point, pull.x() < 0. ? -1 : 1, pull.y() < 0. ? -1 : 1};
+      const Edge edge = {std::int8_t(point), std::int8_t(pull.x() < 0. ? -1 : 1),
+                         std::int8_t(pull.y() < 0. ? -1 : 1)};
       const auto known = edges_.begin() + count_;
       if (std::find(edges_.begin(), known, edge) == known) best = edge, slope = value;
     }

@@ -38,26 +38,48 @@ class ConeProjection {
   Residual project(const Vector6& wrench, const Eigen::Matrix3Xd& levers,
                    const std::vector<double>& mu, std::uint32_t set);
 
+  /// What of the wrench the last answer does not give, as the wrench was given.
+  Vector6 residual() const {
+    Vector6 residual;
+    residual << residual_.head<3>(), lever_ * residual_.tail<3>();
+    return residual;
+  }
+
+  /// The force that a point gives in the last answer. There may be other answers that are as close.
+  Eigen::Vector3d force(int point, const std::vector<double>& mu) const;
+
   /// The vertical force that some points gave together in the last answer. There may be other
   /// answers that are as close.
   double lift(std::uint32_t set) const;
 
- private:
+  /// The edge of a pyramid, along which a point pushes.
   struct Edge {
-    int point;
-    int x, y;  // signs
+    std::int8_t point;
+    std::int8_t x, y;  // signs
     bool operator==(const Edge& other) const {
       return point == other.point && x == other.x && y == other.y;
     }
   };
+  static constexpr int kEdges = 6;  // more do not make a wrench, but for one that is dropped
+
+  /// The edges that make up an answer, from which another may start.
+  struct Answer {
+    std::array<Edge, kEdges> edges;
+    std::int8_t count = 0;
+  };
+  Answer answer() const { return {edges_, std::int8_t(count_)}; }
+  void setAnswer(const Answer& answer) {
+    edges_ = answer.edges;
+    count_ = answer.count;
+  }
+
+ private:
 
   Vector6 direction(const Edge& edge, const Eigen::Matrix3Xd& levers,
                     const std::vector<double>& mu) const;
   void add(const Edge& edge, const Vector6& column);
   void drop(int position);
   bool solve();
-
-  static constexpr int kEdges = 6;  // more do not make a wrench, but for one that is dropped
 
   const double lever_;
   int count_ = 0;
@@ -73,6 +95,7 @@ class ConeProjection {
   std::array<std::array<double, kEdges>, kEdges> L_;
   std::array<double, kEdges> inverse_, y_;
   Vector6 target_;
+  Vector6 residual_ = Vector6::Zero();
 };
 
 }  // namespace dynacom::internal

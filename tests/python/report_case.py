@@ -56,6 +56,9 @@ def report(robot: Robot, motion: Motion, schedule: ContactSchedule) -> tuple[Arr
     names = ("com", "vcom", "acom", "am", "dam", "ground_force", "ground_torque", "cop", "vrp")
     arrays = {name: getattr(analysis, name) for name in ("time", *names, "nl", "residual")}
     arrays["status"] = np.array([status.name for status in analysis.status])
+    displacement = _find_displacement(dynamics, motion, schedule)
+    arrays["distance"] = np.linalg.norm(displacement, axis=1)
+    arrays["feasible_com"] = analysis.com + displacement
     arrays["dcm"] = arrays["com"][:, :2] + arrays["vcom"][:, :2] / analysis.omega
 
     poses = {name: [] for name in robot.contacts}
@@ -70,6 +73,25 @@ def report(robot: Robot, motion: Motion, schedule: ContactSchedule) -> tuple[Arr
             for name, array in _contact_arrays(contact, settings, poses[contact.name]).items()
         }
     return arrays, _summary(robot, arrays, weight, analysis.omega)
+
+
+def _find_displacement(
+    robot: dynacom.DynaCoM, motion: Motion, schedule: ContactSchedule
+) -> np.ndarray:
+    """Of the CoM to the closest feasible motion, where soles carry with all their corners."""
+    split = dynacom.splitContacts(robot)
+    none = ContactSchedule([], np.zeros((len(motion.time), 0), dtype=bool))
+    active = {name: np.asarray(schedule.active)[:, k] for k, name in enumerate(schedule.names)}
+    parts = ContactSchedule(
+        [part.name for part in split.parts],
+        np.column_stack([active[part.name.partition(".")[0]] for part in split.parts]),
+    )
+    return dynacom.distanceToFeasible(
+        split,
+        dynacom.computeContactMotions(split.robot, motion),
+        dynacom.analyzeMotion(split.robot, motion, none),
+        parts,
+    ).com
 
 
 def _contact_arrays(contact: Any, settings: Any, poses: list[pin.SE3]) -> Arrays:
@@ -95,6 +117,14 @@ def _contact_arrays(contact: Any, settings: Any, poses: list[pin.SE3]) -> Arrays
         "height": position[:, 2],
         "speed": np.zeros(len(position)),
     }
+
+
+def _verdict(arrays: Arrays, reasons: list[dict[str, Any]]) -> str:
+    distance = arrays["distance"]
+    if not any(reason["holds"] for reason in reasons):
+        return "feasible"
+    is_near = np.sqrt(np.mean(distance**2)) <= 0.01 and distance.max() <= 0.05
+    return "repairable" if is_near else "not feasible"
 
 
 def _summary(robot: Robot, arrays: Arrays, weight: float, omega: float) -> Summary:
@@ -137,7 +167,13 @@ def _summary(robot: Robot, arrays: Arrays, weight: float, omega: float) -> Summa
         "duration": float(time[-1] - time[0]),
         "frame_rate": (len(time) - 1) / float(time[-1] - time[0]),
         "omega": omega,
-        "verdict": "not feasible" if any(reason["holds"] for reason in reasons) else "feasible",
+        "verdict": _verdict(arrays, reasons),
+        "distance": {
+            "rms": float(np.sqrt(np.mean(arrays["distance"] ** 2))),
+            "largest": float(arrays["distance"].max()),
+            "time": float(time[np.argmax(arrays["distance"])]),
+            "converged": True,
+        },
         "reasons": reasons,
         "feasible_share": 0.75,
         "windows": [[float(time[0]), float(time[len(time) // 4])], [0.5 * time[-1], time[-1]]],

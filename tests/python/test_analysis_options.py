@@ -3,13 +3,22 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import yaml
 
 import dynacom
-from dynacom import AnalysisOptions, DetectionSettings, DynacomError, FaultLimit, VerdictSettings
+from dynacom import (
+    AnalysisOptions,
+    CentroidalFilterSettings,
+    DetectionSettings,
+    DynacomError,
+    FaultLimit,
+    VerdictSettings,
+)
+from dynacom.presets import PRESETS
 from helpers import WALKS
 
 
@@ -44,6 +53,8 @@ def test_defaults(options):
     assert options.cutoff == "auto"
     assert options.omega == 0.0
     assert options.flat is True
+    assert options.distance is True
+    assert options.filter == CentroidalFilterSettings()
     assert options.detection == DetectionSettings()
     assert options.verdict == VerdictSettings()
     options.validate()
@@ -57,6 +68,8 @@ def test_a_file(options, tmp_path):
     path.write_text("""
 cutoff: 8
 flat: false
+distance: false
+filter: {com: 0.02, window: 5}
 detection: {change: 3, ground_height: -0.1, ground_velocity: [-1, 0.5, 0]}
 verdict:
   residual_force: {limit: 2e-1, allowed_share: 0.5}
@@ -67,6 +80,9 @@ verdict:
     assert changes(options) == {
         "cutoff": 8.0,
         "flat": False,
+        "distance": False,
+        "filter.com": 0.02,
+        "filter.window": 5.0,
         "detection.change": 3.0,
         "detection.ground_height": -0.1,
         "detection.ground_velocity": [-1.0, 0.5, 0.0],
@@ -124,11 +140,12 @@ def test_every_setting_can_be_set_by_a_text():
         return found
 
     every = paths(AnalysisOptions().to_dict())
-    constants = len(every) - 2 - 4 - len(dynacom.describeFaults()) * 2 - 7
+    costs = repr(CentroidalFilterSettings()).count("=")
+    constants = len(every) - 2 - 5 - costs - len(dynacom.describeFaults()) * 2 - 9
     assert constants == repr(DetectionSettings()).count("=") - 2 > 30
     for path in every:
         value, text = 0.51, "0.51"
-        if path == "flat":
+        if path in ("flat", "distance"):
             value, text = False, "false"
         elif path == "feet_only":
             value, text = True, "true"
@@ -199,6 +216,71 @@ def test_the_last_counts(options):
     assert changes(options) == {"cutoff": 4.0, "omega": 1.0}
 
 
+# Presets.
+
+
+def test_presets_are_those_documented(root):
+    text = (root / "docs" / "verdict.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \|", text.split("### Presets")[1], re.MULTILINE)
+    assert rows[: len(PRESETS)] == list(PRESETS)
+
+
+@pytest.mark.parametrize("name", ["talos", "g1", "solo12"])
+def test_presets_of_robots(options, name):
+    """Newtons of people are parts of the robot's weight."""
+    robot = dynacom.load_robot(name)
+    weight = 9.81 * robot.dynacom().getMass()
+    options.update_from_preset("opensim", robot)
+    assert options.verdict.residual_force == FaultLimit(25.0 / weight, 0.0)
+    assert options.verdict.residual_torque == FaultLimit(75.0 / weight, 0.0)
+    assert options.verdict.flight_with_support_needed == FaultLimit(25.0 / weight, 0.0)
+    assert len(changes(options)) == 6
+
+    own = robot.dynacom()
+    rest = np.zeros(robot.model.nv)
+    own.computeDynamics(robot.default, rest, rest)
+    heights = []
+    for contact in robot.contacts:
+        pose, settings = own.getContact(contact).getSurfacePose(), robot.contacts[contact]
+        x, y = (getattr(settings, f"half_{side}", 0.0) for side in ("length", "width"))
+        corners = [[sx * x, sy * y, 0.0] for sx in (-1, 1) for sy in (-1, 1)]
+        heights += [pose.act(np.array(corner))[2] for corner in corners]
+    height = own.getCoM()[2] - min(heights)
+    assert 0.1 < height < 1.2
+    options.update_from_preset("hicks", robot)
+    assert options.verdict.residual_force == FaultLimit(0.05, 0.0)
+    assert options.verdict.residual_torque.limit == pytest.approx(0.01 * height)
+    assert options.verdict.residual_torque.allowed_share == 0.0
+    assert options.verdict.flight_with_support_needed == FaultLimit(0.05, 0.0)
+    heavy = robot.with_payload(robot.model.frames[-1].name, 3.0)
+    options.update_from_preset("opensim", heavy)
+    assert options.verdict.residual_force.limit == pytest.approx(25.0 / (weight + 3.0 * 9.81))
+
+
+def test_strict_is_a_tenth(options, talos):
+    options.update_from_preset("strict", talos)
+    found = changes(options)
+    defaults = AnalysisOptions().to_dict()["verdict"]
+    assert {path.split(".")[1] for path in found} == set(defaults) - {
+        *("downward_normal", "discontinuity"),
+        *(name for name, value in defaults.items() if not isinstance(value, dict)),
+    }
+    for path, value in found.items():
+        _, code, field = path.split(".")
+        assert field == "limit"
+        assert value == pytest.approx(0.1 * defaults[code]["limit"])
+
+
+def test_presets_that_cannot_be(options, talos, tmp_path):
+    with pytest.raises(
+        DynacomError, match="^unknown preset 'lax', expected hicks, opensim, strict$"
+    ):
+        options.update_from_preset("lax", talos)
+    with pytest.raises(DynacomError, match="^preset hicks: talos must have contacts"):
+        options.update_from_preset("hicks", replace(talos, contacts={}))
+    assert changes(options) == {}
+
+
 # Errors.
 
 
@@ -208,7 +290,7 @@ def test_the_last_counts(options):
         ("cutoff", ["setting must be NAME=VALUE", "got 'cutoff'"]),
         ("cutoff=", ["setting must be NAME=VALUE", "got 'cutoff='"]),
         ("", ["setting must be NAME=VALUE", "got ''"]),
-        ("=3", ["setting '=3'", "unknown setting ''", "cutoff, omega, flat, feet_only, detection"]),
+        ("=3", ["setting '=3'", "unknown setting ''", "feet_only, distance, filter, detection"]),
         ("speed=3", ["setting 'speed=3'", "unknown setting 'speed'", "expected cutoff"]),
         ("detection.mu=3", ["detection: unknown setting 'mu'", "expected rest_speed_part"]),
         ("verdict.feasible=3", ["verdict: unknown setting 'feasible'", "residual_force"]),
@@ -224,6 +306,10 @@ def test_the_last_counts(options):
         ("omega=auto", ["omega must be a finite number, got 'auto'"]),
         ("omega=null", ["omega must be a finite number", "got None"]),
         ("flat=1", ["flat must be true or false", "got 1"]),
+        ("distance=1", ["distance must be true or false", "got 1"]),
+        ("filter.com=0", ["CentroidalFilterSettings.com must be finite and > 0, got 0"]),
+        ("filter=1", ["filter: must be a mapping with com", "got 1"]),
+        ("verdict.repairable_distance=0", ["VerdictSettings.repairable_distance must be", "got 0"]),
         ("detection=3", ["detection: must be a mapping with rest_speed_part", "got 3"]),
         ("detection.rate=true", ["detection: rate must be a finite number", "got True"]),
         ("detection.rate=-1", ["settings: DetectionSettings.rate must be", "got -1"]),

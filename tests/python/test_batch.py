@@ -95,6 +95,10 @@ def test_values_are_those_of_analyze(result, anymal):
             *("mean_vertical_force", "momentum_change", "feasible_share", "windows"),
         ):
             assert row[name] == summary[name], name
+        distance = summary["distance"] or {"rms": None, "largest": None}
+        assert row["distance_rms"] == distance["rms"]
+        assert row["distance_max"] == distance["largest"]
+        assert (row["distance_rms"] is None) == (row["verdict"] == "unknown")
         known = row["verdict"] != "unknown"
         assert row["feasible"] is (report.verdict.feasible if known else None)
         assert known != (row["codes"] == ["too_short"])
@@ -199,6 +203,20 @@ def test_options_and_reading_are_those_of_analyze(tmp_path):
     assert (row["status"], row["omega"], row["cutoff"]) == ("ok", 4.0, None)
     assert row["frame_rate"] == pytest.approx(50.0)
     assert dynacom.batch(tmp_path, ROBOT)["status"].to_pylist() == ["error"]
+
+
+def test_without_distance(walks, tmp_path, run):
+    """It reaches the workers, and the page."""
+    out = tmp_path / "out"
+    done = run("batch", walks, "--robot", ROBOT, "--out", out, "--no-distance", "--frames")
+    assert (done.returncode, done.stderr) == (0, "")
+    table = pyarrow.parquet.read_table(out / "clips.parquet")
+    assert table["status"].to_pylist() == 4 * ["ok"]
+    for name in ("distance_rms", "distance_max"):
+        assert table[name].to_pylist() == 4 * [None]
+    frames = pyarrow.dataset.dataset(out / "frames", partitioning="hive").to_table()
+    assert np.isnan(frames["distance"]).all()
+    assert (out / "index.html").read_text().count('<td class="n" data-value="-Infinity">–') == 8
 
 
 # Which files.
@@ -336,6 +354,7 @@ def test_resume_does_what_has_changed(walks, tmp_path):
     "options",
     [
         {"options": dynacom.AnalysisOptions(omega=3.0)},
+        {"options": dynacom.AnalysisOptions(distance=False)},
         {"fps": 30.0},
         {"frames": True},
     ],
@@ -424,11 +443,11 @@ def test_the_table_is_in_order_however_rows_come(tmp_path, anymal, monkeypatch, 
 
 @pytest.fixture
 def slow(tmp_path, anymal):
-    """Clips that take a while each, and a file that tells how often each has been read."""
+    """Clips that take longer than parts are kept back, and a file that tells how often each is."""
     folder, log = tmp_path / "slow", tmp_path / "log"
     folder.mkdir()
     for number in range(24):
-        statement = f"import time; open({str(log)!r}, 'a').write('{number}\\n'); time.sleep(0.15)"
+        statement = f"import time; open({str(log)!r}, 'a').write('{number}\\n'); time.sleep(0.2)"
         write_program(folder / f"{number:02}.pkl", anymal, 5 * number, statement)
     return folder, log
 
@@ -621,7 +640,8 @@ def test_index(clips, result):
     assert f"<h1>{table.num_rows} clips of {ROBOT}</h1>" in page
     for text, count in (
         ("feasible", sum(row["feasible"] is True for row in good)),
-        ("not feasible", sum(row["feasible"] is False for row in good)),
+        ("repairable", sum(row["verdict"] == "repairable" for row in good)),
+        ("not feasible", sum(row["verdict"] == "not feasible" for row in good)),
         ("unknown: too short", 1),
         ("error", len(bad)),
     ):
@@ -641,7 +661,7 @@ def test_lists_of_the_index_are_short(walks, tmp_path):
     out = tmp_path / "out"
     dynacom.batch(walks, ROBOT, out=out)
     found = batch_overview.overview(out / "clips.parquet", listed=2)
-    assert (found.clips, found.feasible, found.errors) == (9, 4, 5)
+    assert (found.clips, found.verdicts["feasible"], found.errors) == (9, 4, 5)
     assert len(found.worst) == 2
     assert [row["file"][-9:] for row in found.failed] == ["bad_0.csv", "bad_1.csv"]
     assert found.frames == 80

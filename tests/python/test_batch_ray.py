@@ -58,6 +58,14 @@ def test_rows_are_those_of_local(ray, tmp_path):
     assert same(again, dynacom.batch(folder, ROBOT))
 
 
+def test_options_reach_actors(ray, tmp_path):
+    clip = cut(tmp_path / "walk.npz", 0, 30)
+    for distance in (True, False):
+        options = dynacom.AnalysisOptions(distance=distance)
+        table = dynacom.batch(clip, ROBOT, engine="ray", jobs=1, options=options)
+        assert (table["distance_rms"][0].as_py() is not None) == distance
+
+
 def test_an_actor_is_killed(ray, tmp_path, anymal):
     """What was on it is done by another, and a clip that kills its worker is an error."""
     folder, log = tmp_path / "clips", tmp_path / "log"

@@ -20,6 +20,14 @@ def cases(shared_data: Path) -> Path:
     return folder
 
 
+def millimetres(report: MotionReport) -> float:
+    """The distance to feasible."""
+    distance = report.summary["distance"]
+    assert distance["converged"]
+    assert np.sqrt(np.mean(report["distance"] ** 2)) == pytest.approx(distance["rms"])
+    return 1e3 * distance["rms"]
+
+
 def judge(path: Path, robot: object = "talos", **arguments: object) -> MotionReport:
     return dynacom.analyze(path, robot, sensitivity=False, **arguments)
 
@@ -58,6 +66,7 @@ def test_a_raised_foot(cases):
     assert note(report, "right_sole rests 5 cm up")
     worst = report.verdict.findings["cop_outside"].worst
     assert worst == pytest.approx(0.025, abs=0.002)
+    assert 20.0 < millimetres(report) < 30.0
 
 
 def test_leaning(cases):
@@ -66,6 +75,11 @@ def test_leaning(cases):
     assert verdict(report) == ("not feasible", ["cop_outside"])
     worst = report.verdict.findings["cop_outside"].worst
     assert worst == pytest.approx(0.05, abs=0.002)
+    assert 45.0 < millimetres(report) < 60.0
+    # Back over the toes, that is, and neither up nor down.
+    moved = report["feasible_com"] - report["com"]
+    assert (moved[:, 0] < -0.04).all()
+    assert np.abs(moved[:, 1:]).max() < 0.005
 
 
 def test_on_the_edges_of_tilted_soles(cases):
@@ -80,6 +94,7 @@ def test_on_the_edges_of_tilted_soles(cases):
         assert note(report, f"{name} is tilted: its rear_left and rear_right rest 10 cm up")
     worst = report.verdict.findings["cop_outside"].worst
     assert worst == pytest.approx(0.15, abs=0.005)
+    assert 130.0 < millimetres(report) < 170.0
     # They are no feet that are held in the air.
     assert not note(report, "say by --schedule")
 
@@ -103,6 +118,7 @@ def test_a_slope(cases):
     assert verdict(report) == ("feasible", ["feasible"])
     assert_schedule(report, cases / "slope3.schedule.yaml", 2)
     assert note(report, "The ground is a slope of 3.0 degrees, which rises towards")
+    assert report.summary["distance"]["largest"] == 0.0
     # Who walks steadily asks of the ground what its weight does; forces have the slope's normal.
     active = np.asarray(report.examination.inference.schedule.active)
     for index, contact in enumerate(report.examination.analysis.contacts):
@@ -116,6 +132,7 @@ def test_stairs(cases):
     report = judge(cases / "stairs.npz")
     assert verdict(report) == ("feasible", ["feasible"])
     assert_schedule(report, cases / "stairs.schedule.yaml", 2)
+    assert report.summary["distance"]["largest"] == 0.0
     assert note(report, "left_sole stands at 0.00, 0.15 and 0.45 m")
     assert note(
         report, "right_sole stands at 0.00, 0.30 and 0.45 m: steps or stairs, or feet that float."

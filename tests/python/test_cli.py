@@ -94,6 +94,7 @@ def test_help(command):
         *("--robot", "--urdf", "--contact", "--payload", "--fps", "--quat", "--trust", "--clip"),
         *("--schedule", "--cutoff", "--ground-height", "--flat", "--uneven", "--omega"),
         *("--settings", "--set", "--out", "--csv", "--page", "--no-page", "--check"),
+        *("--distance", "--no-distance", "--preset"),
     ):
         assert option in out
 
@@ -226,9 +227,73 @@ def test_check(command, tmp_path):
     assert command(*strict)[0] == 0
     status, printed, err = command(*strict, "--check")
     assert (status, err) == (1, "")
-    assert ("Verdict", "not feasible") in cells(printed)
+    assert ("Verdict", "repairable") in cells(printed)
     assert sorted(os.listdir(tmp_path)) == FILES
     assert summary(tmp_path)["codes"] == ["foot_sliding"]
+
+
+def test_check_of_what_is_repairable(command, tmp_path):
+    """The walk is feasible but for the limit; no displacement at all mends that."""
+    limit = ["--set", "verdict.foot_sliding.limit=1e-5"]
+    arguments = ["analyze", WALK, "--robot", "talos", "--no-page", "--out", tmp_path]
+    status, printed, _ = command(*arguments, *limit)
+    assert status == 0
+    assert cells(printed)[0] == ("Verdict", "repairable")
+    # The option's value may be left out, and what follows is not taken for it.
+    for check, expected in (
+        (["--check"], 1),
+        (["--check", "feasible"], 1),
+        (["--check=feasible"], 1),
+        (["--check", "repairable"], 0),
+        (["--check=repairable"], 0),
+    ):
+        assert command("analyze", *check, *arguments[1:], *limit)[0] == expected
+        assert command(*arguments, *limit, *check)[0] == expected
+    assert command(*arguments, "--check", "repairable")[0] == 0
+    assert command(*arguments, *limit, "--no-distance", "--check", "repairable")[0] == 1
+    status, _, err = command(*arguments, "--check=possible")
+    assert (status, err) == (2, "dynacom: check must be feasible or repairable, got 'possible'\n")
+
+
+def test_the_distance_is_printed(analyze, shared_data):
+    """Who leans too far is told by how much; whoever does not ask is told nothing."""
+    path = shared_data / "cases" / "lean_05cm.npz"
+    if not path.exists():
+        pytest.skip("there are no cases")
+    out, printed = analyze(path)
+    found = summary(out)["distance"]
+    rms, largest = (f"{1e3 * found[name]:.0f} mm" for name in ("rms", "largest"))
+    assert cells(printed)[:2] == [
+        ("Verdict", "not feasible"),
+        (
+            "Distance",
+            f"{rms} from a feasible motion (RMS; {largest} at most, at {found['time']:.2f} s)",
+        ),
+    ]
+    table = pyarrow.parquet.read_table(out / "frames.parquet")
+    assert max(table["distance"].to_pylist()) == found["largest"]
+
+    out, printed = analyze(path, "--no-distance")
+    assert summary(out)["distance"] is None
+    assert summary(out)["options"]["distance"] is False
+    assert "Distance" not in dict(cells(printed))
+    again = pyarrow.parquet.read_table(out / "frames.parquet")
+    assert again.column_names == table.column_names
+    assert np.isnan(again["distance"]).all()
+    assert np.isnan(again["feasible_com_z"]).all()
+    assert again["com_x"].equals(table["com_x"])
+
+
+def test_presets(analyze, command, tmp_path):
+    """They come before what settings say."""
+    out, _ = analyze(WALK, "--preset", "hicks", "--set", "verdict.residual_torque.limit=0.5")
+    verdict = summary(out)["options"]["verdict"]
+    assert verdict["residual_force"] == {"limit": 0.05, "allowed_share": 0.0}
+    assert verdict["residual_torque"] == {"limit": 0.5, "allowed_share": 0.0}
+    arguments = ("analyze", WALK, "--robot", "talos", "--out", tmp_path / "other")
+    status, _, err = command(*arguments, "--preset", "lax")
+    assert status == 2
+    assert err == "dynacom: unknown preset 'lax', expected hicks, opensim, strict\n"
 
 
 def test_check_of_what_is_unknown(command, tmp_path, clip):
@@ -415,7 +480,11 @@ def test_what_is_printed(analyze, motion_file, talos):
     limits = (f"verdict.{code}.limit=0" for code in ("foot_sliding", "ground_penetration"))
     out, printed = analyze(motion_file(), *(part for text in limits for part in ("--set", text)))
     rows, found = cells(printed), summary(out)
-    assert rows[0] == ("Verdict", "not feasible")
+    assert rows[0] == ("Verdict", "repairable")
+    title, text = rows.pop(1)
+    rms, largest = (f"{1e3 * found['distance'][name]:.1f} mm" for name in ("rms", "largest"))
+    assert title == "Distance"
+    assert text.startswith(f"{rms} from a feasible motion (RMS; {largest} at most, at ")
     reasons = [entry for entry in found["reasons"] if entry["holds"]]
     assert len(reasons) >= 2
     assert rows[1 : 1 + len(reasons)] == [(entry["code"], entry["text"]) for entry in reasons]

@@ -50,6 +50,7 @@ SUMMARY = [
     "omega",
     "verdict",
     "codes",
+    "distance",
     "reasons",
     "feasible_share",
     "windows",
@@ -161,6 +162,9 @@ def test_arrays_are_those_of_the_steps_by_hand(talos, walk, flat):
         }
         expected |= {f"contact.{contact.name}.{name}": value for name, value in values.items()}
     expected["fault"] = [""] * len(walk.time)
+    change = dynacom.distanceToFeasible(split, corners, parts, inference.schedule)
+    expected["distance"] = np.linalg.norm(change.com, axis=1)
+    expected["feasible_com"] = analysis.com + change.com
     assert set(report.arrays) == set(expected)
     for name, values in expected.items():
         if name.endswith((".speed", ".height")):
@@ -331,7 +335,7 @@ def test_reasons(report, walk, talos):
     options.verdict.foot_sliding = FaultLimit(1e-5, 0.1)
     options.verdict.ground_penetration = FaultLimit(1e-5, 0.9)
     strict = analyze(walk, talos, options=options)
-    assert strict.summary["verdict"] == "not feasible"
+    assert strict.summary["verdict"] == "repairable"
     assert strict.summary["codes"] == ["foot_sliding"]
     for entry, (code, finding) in zip(
         strict.summary["reasons"], strict.verdict.findings.items(), strict=True

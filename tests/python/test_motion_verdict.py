@@ -56,8 +56,13 @@ NUMBERS = {
     "jump_time": 0.25,
     "minimal_window": 1.0,
     "interruption": 0.1,
+    "repairable_distance": 0.01,
+    "repairable_largest_distance": 0.05,
 }
-POSITIVE = ("linear_speed", "turning_speed", "joint_speed")
+POSITIVE = (
+    *("linear_speed", "turning_speed", "joint_speed"),
+    *("repairable_distance", "repairable_largest_distance"),
+)
 FRAMES, MASS, G = 100, 10.0, 9.81
 SOLES = ["left", "right"]
 

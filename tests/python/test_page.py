@@ -31,7 +31,7 @@ def hurried(talos: Robot) -> Report:
         faster = {"t": file["t"] / haste, "v": haste * file["v"], "a": haste**2 * file["a"]}
     q, arrays, summary = walk_report(talos, **faster)
     summary["clip"] = "talos_hurries.npz"
-    assert summary["verdict"] == "not feasible"
+    assert summary["verdict"] == "repairable"
     return q, arrays, summary
 
 
@@ -48,7 +48,7 @@ def reason(summary: Summary, code: str) -> dict[str, Any]:
 
 # ---- The page in a browser ----
 
-TIME_PLOTS = ("forces", "friction", "residual_force", "residual_torque", "schedule")
+TIME_PLOTS = ("forces", "friction", "residual_force", "residual_torque", "distance", "schedule")
 
 
 def cursors(tab: Page) -> list[float]:
@@ -89,7 +89,7 @@ def test_page_in_a_browser(hurried_page, hurried, request, root):
     time = arrays["time"]
     with open_page(hurried_page) as tab:
         player = open_scene(tab).locator("input.mantine-NumberInput-input")
-        assert tab.locator(".verdict h2").inner_text() == "Not feasible"
+        assert tab.locator(".verdict h2").inner_text() == "Repairable"
         for plot in ("above", *TIME_PLOTS[:-1]):
             lengths = tab.locator(f"#{plot} path.js-line").evaluate_all(
                 "(lines) => lines.map((line) => line.getTotalLength())"
@@ -228,7 +228,7 @@ def test_hostile_names(talos, hurried, tmp_path, monkeypatch):
             return {names.get(key, key): renamed(item) for key, item in value.items()}
         if isinstance(value, list):
             return [renamed(item) for item in value]
-        return HOSTILE if isinstance(value, str) and value != "not feasible" else value
+        return HOSTILE if isinstance(value, str) and value != "repairable" else value
 
     codes = [{**item, "code": f"{item['code']}{HOSTILE}"} for item in summary["reasons"]]
     hostile = renamed({**summary, "reasons": [], "statuses": {HOSTILE: 318}})
@@ -277,16 +277,66 @@ def test_feasible_walk(talos, tmp_path, monkeypatch):
     write_page(tmp_path / "full.html", talos, q, arrays, summary)
     arrays = {name: array for name, array in arrays.items() if "measured" not in name}
     none = {"notes": [], "cutoff_sensitivity": [], "measured": {}, "ground": {}, "cutoff": None}
+    none["distance"] = None
     write_page(tmp_path / "bare.html", talos, q, arrays, summary | none)
     full, bare = ((tmp_path / f"{name}.html").read_text("utf-8") for name in ("full", "bare"))
     for text in (full, bare):
-        assert '<section class="verdict good"><h2>Feasible</h2><p class="caption">Windows' in text
+        assert '<section class="verdict good"><h2>Feasible</h2><p class="caption' in text
         assert "75.0&nbsp;% of the frames" in text
         assert text.count('class="time"') == 4 + len(summary["reasons"])
         assert text.count("<code>") == len(summary["reasons"])
-    for title in ("How it depends on the filter", "Computed against the file's forces"):
+    for title in (
+        *("How it depends on the filter", "Computed against the file's forces"),
+        *(
+            '<p class="caption distance">Distance: none: the contacts',
+            "feasible CoM",
+            '<figure class="">',
+        ),
+    ):
         assert title in full
         assert title not in bare
+
+
+@pytest.mark.parametrize(("verdict", "kind"), [("repairable", "fair"), ("not feasible", "bad")])
+def test_what_is_not_feasible(talos, hurried, tmp_path, monkeypatch, verdict, kind):
+    """What is repairable has a colour of its own; the reasons that hold stand open."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    q, arrays, summary = hurried
+    held = sum(item["holds"] for item in summary["reasons"])
+    assert held > 0
+    write_page(tmp_path / "report.html", talos, q, arrays, summary | {"verdict": verdict})
+    text = (tmp_path / "report.html").read_text("utf-8")
+    assert f'<section class="verdict {kind}"><h2>{verdict.capitalize()}</h2>' in text
+    opened = text[text.index(f'class="verdict {kind}"') : text.index("<details>")]
+    assert opened.count("<code>") == held
+    largest = arrays["distance"].max()
+    assert 0.001 < largest < 0.01
+    assert f"{1e3 * largest:.1f} mm at most, at <button" in opened
+    assert f'data-time="{summary["distance"]["time"]!r}"' in opened
+    assert summary["distance"]["time"] == arrays["time"][np.argmax(arrays["distance"])]
+
+
+def test_the_distance_is_drawn(talos, hurried, tmp_path, monkeypatch):
+    """Over time in millimetres, and as a path beside the CoM's, if there is one."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    q, arrays, summary = hurried
+    script = (
+        "Array.from(document.getElementById('above').data.filter((trace) => trace.name === '{}'),"
+        " (trace) => Array.from(trace.y))[0]"
+    )
+    write_page(tmp_path / "report.html", talos, q, arrays, summary)
+    with open_page(tmp_path / "report.html") as tab:
+        tab.locator("#clock", has_text="frame 0").wait_for()
+        drawn = tab.evaluate("Array.from(document.getElementById('distance').data[0].y)")
+        assert_allclose(drawn, 1e3 * arrays["distance"], rtol=1e-6)
+        for name, title in (("com", "CoM"), ("feasible_com", "feasible CoM")):
+            assert_allclose(tab.evaluate(script.format(title)), arrays[name][:, 1], atol=1e-6)
+    write_page(tmp_path / "report.html", talos, q, arrays, summary | {"distance": None})
+    with open_page(tmp_path / "report.html") as tab:
+        tab.locator("#clock", has_text="frame 0").wait_for()
+        assert not tab.locator("#distance").is_visible()
+        assert tab.evaluate(script.format("feasible CoM")) is None
+        assert tab.locator("#residual_torque .js-line").count() == 1
 
 
 def test_unknown(talos, tmp_path, monkeypatch):
@@ -295,7 +345,7 @@ def test_unknown(talos, tmp_path, monkeypatch):
     q, arrays, summary = walk_report(talos)
     for item in summary["reasons"]:
         item["holds"] = True
-    unknown = {"verdict": "unknown", "windows": [], "feasible_share": 0.0}
+    unknown = {"verdict": "unknown", "distance": None, "windows": [], "feasible_share": 0.0}
     write_page(tmp_path / "report.html", talos, q, arrays, summary | unknown)
     text = (tmp_path / "report.html").read_text("utf-8")
     assert '<section class="verdict unknown"><h2>Unknown</h2><p><code>too_short</code>' in text

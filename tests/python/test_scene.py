@@ -29,7 +29,12 @@ Report = tuple[np.ndarray, Arrays, Summary]
 
 @pytest.fixture(scope="module")
 def walk(talos: Robot) -> Report:
-    return walk_report(talos)
+    """As if a feasible motion were beside it, by 2 cm in the middle."""
+    q, arrays, summary = walk_report(talos)
+    displacement = np.zeros_like(arrays["com"])
+    displacement[:, 1] = 0.02 * np.sin(np.linspace(0.0, np.pi, len(displacement)))
+    com = arrays["com"] + displacement
+    return q, arrays | {"distance": displacement[:, 1], "feasible_com": com}, summary
 
 
 @pytest.fixture(scope="module")
@@ -158,6 +163,9 @@ def test_points(walk, recording, player):
         for name in ("cop", "vrp"):
             drawn = objects[f"/world/{name}"]
             assert_allclose(drawn["position"], [*arrays[name][frame], 0.0], atol=1e-7)
+        drawn = objects["/world/feasible_com"]
+        assert_allclose(drawn["position"], arrays["feasible_com"][frame], atol=1e-7)
+        assert drawn["visible"] == (arrays["distance"][frame] > 1e-3)
 
 
 def test_forces(talos, walk, recording, player):
