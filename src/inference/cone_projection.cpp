@@ -78,15 +78,6 @@ bool ConeProjection::solve() {
   return true;
 }
 
-Eigen::Vector3d ConeProjection::force(int point, const std::vector<double>& mu) const {
-  const double friction = mu[static_cast<std::size_t>(point)];
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (int k = 0; k < count_; ++k)
-    if (edges_[k].point == point)
-      sum += factors_[k] * Eigen::Vector3d(edges_[k].x * friction, edges_[k].y * friction, 1.);
-  return sum;
-}
-
 double ConeProjection::lift(std::uint32_t set) const {
   double sum = 0.;
   for (int k = 0; k < count_; ++k)

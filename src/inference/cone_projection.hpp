@@ -45,9 +45,6 @@ class ConeProjection {
     return residual;
   }
 
-  /// The force that a point gives in the last answer. There may be other answers that are as close.
-  Eigen::Vector3d force(int point, const std::vector<double>& mu) const;
-
   /// The vertical force that some points gave together in the last answer. There may be other
   /// answers that are as close.
   double lift(std::uint32_t set) const;
@@ -74,7 +71,6 @@ class ConeProjection {
   }
 
  private:
-
   Vector6 direction(const Edge& edge, const Eigen::Matrix3Xd& levers,
                     const std::vector<double>& mu) const;
   void add(const Edge& edge, const Vector6& column);
