@@ -72,6 +72,8 @@ def objects(talos, talos_standing, talos_motion):
         dynacom.computeContactMotions(robot, motion)[0],
         dynacom.DetectionSettings(),
         dynacom.VerdictSettings(),
+        dynacom.CentroidalFilterSettings(),
+        examination.distance,
         dynacom.FaultLimit(0.1, 0.2),
         dynacom.AnalysisOptions(),
         dynacom.BatchProgress(3, 1),
