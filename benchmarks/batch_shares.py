@@ -57,7 +57,9 @@ class Bench:
     """Does with clips what a batch does."""
 
     def __init__(self):
-        self.job = Job(dynacom.load_robot("g1"), dynacom.AnalysisOptions(), fps=clips.FPS)
+        self.job = Job(
+            dynacom.load_robot("g1"), dynacom.AnalysisOptions(distance=False), fps=clips.FPS
+        )
         self.judge = Judge(self.job)
         self.robot = self.job.robot.dynacom()
         self.parts = dynacom.splitContacts(self.robot)

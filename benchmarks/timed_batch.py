@@ -7,6 +7,7 @@ import json
 import sys
 import time
 
+import dynacom
 from dynacom.batch import run_batch
 
 
@@ -19,7 +20,16 @@ def main():
         last = time.monotonic(), state
         first = first or last
 
-    run_batch(folder, "g1", out, engine=engine, jobs=int(jobs), fps=float(fps), progress=keep)
+    run_batch(
+        folder,
+        "g1",
+        out,
+        options=dynacom.AnalysisOptions(distance=False),
+        engine=engine,
+        jobs=int(jobs),
+        fps=float(fps),
+        progress=keep,
+    )
     (first_time, before), (last_time, state) = first, last
     result = {
         # Of the system's clock, which is that of the caller, too [s].
