@@ -463,8 +463,10 @@ class MotionExaminer::Workspace::Pipeline {
                                                 const ContactInference& inference,
                                                 const SweptMotion& swept,
                                                 MotionVerdict& verdict) const {
+    const MotionAnalysis& needed = swept.analysis;
     if (!settings_.distance || verdict.outcome == MotionOutcome::Unknown ||
-        !swept.analysis.com.allFinite())
+        !needed.com.allFinite() || !needed.ground_force.allFinite() ||
+        !needed.ground_torque.allFinite())
       return std::nullopt;
     ContactSchedule schedule = inference.schedule;
     const Eigen::VectorXd& time = derived.motion.time;
