@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <pinocchio/spatial.hpp>
 
 #include "../standard_gravity.hpp"
 
@@ -28,12 +29,6 @@ constexpr double kLever = 1.;
 
 constexpr double square(double value) { return value * value; }
 
-Eigen::Matrix3d skew(const Eigen::Vector3d& a) {
-  Eigen::Matrix3d matrix;
-  matrix << 0., -a.z(), a.y(), a.z(), 0., -a.x(), -a.y(), a.x(), 0.;
-  return matrix;
-}
-
 }  // namespace
 
 CentroidalWindow::CentroidalWindow(const CentroidalProblem& problem,
@@ -50,16 +45,6 @@ Eigen::Vector3d CentroidalWindow::angularMomentum(Index k) const {
   Eigen::Vector3d sum = x_.col(k).tail<3>();
   if (k > 0) sum += x_.col(k - 1).tail<3>();
   return 0.5 * sum;
-}
-
-double CentroidalWindow::cost() const {
-  double cost = 0.;
-  for (Index k = 0; k < frames_; ++k)
-    cost +=
-        differences_[at(k)].duration * (of_displacement_ * x_.col(k).head<3>().squaredNorm() +
-                                        differences_[at(k)].cost * acceleration(k).squaredNorm() +
-                                        of_momentum_ * x_.col(k).tail<3>().squaredNorm());
-  return cost;
 }
 
 void CentroidalWindow::solve(Index first, Index frames) {
@@ -156,9 +141,9 @@ void CentroidalWindow::factorize() {
     A.setZero();
     for (int i = 0; i < 3; ++i) A.block<3, 3>(0, 6 * i).diagonal().setConstant(factors[i]);
     if (!isFlight(k)) {
-      const Eigen::Matrix3d displaced = skew(x_.col(k).head<3>()) / kLever;
+      const Eigen::Matrix3d displaced = pinocchio::skew(x_.col(k).head<3>()) / kLever;
       for (int i = 0; i < 3; ++i) A.block<3, 3>(3, 6 * i) = factors[i] * displaced;
-      A.block<3, 3>(3, 6) -= skew(moved_[at(k)].head<3>()) / kLever;
+      A.block<3, 3>(3, 6) -= pinocchio::skew(moved_[at(k)].head<3>()) / kLever;
     }
     if (!isLast(k)) A.block<3, 3>(3, 9).diagonal().setConstant(1. / (dt * kLever));
     if (k > 0) A.block<3, 3>(3, 3).diagonal().setConstant(-1. / (dt * kLever));

@@ -22,8 +22,7 @@ struct CentroidalProblem {
   Eigen::Array<bool, Eigen::Dynamic, 1> free;       // frames of which nothing is asked
 };
 
-/// The cheapest change of some frames in a row, at rest at both
-/// ends.
+/// The cheapest change of some frames in a row, at rest at both ends.
 class CentroidalWindow {
  public:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -38,8 +37,6 @@ class CentroidalWindow {
   Eigen::Vector3d displacement(Eigen::Index k) const { return x_.col(k).head<3>(); }
   Eigen::Vector3d angularMomentum(Eigen::Index k) const;  // [m g·m·s]
   Vector6 residual(Eigen::Index k) const { return moved_[at(k)] - given_[at(k)]; }
-  /// The integral that is minimised.
-  double cost() const;
   int iterations() const { return iterations_; }
   bool converged() const { return converged_; }
 
