@@ -109,11 +109,14 @@ class Bench:
         how = {"flatHorizontalGround": options.flat, "omega": options.omega, "threads": 1}
         none = dynacom.ContactSchedule([], np.zeros((frames, 0), dtype=bool))
         needed = step(sweeping, dynacom.analyzeMotion, parts.robot, motion, none, **how)
-        exact = derived.cutoff == 0.0 or (
-            derived.is_automatic and derived.thinned_noise <= dynacom.kExactNoise
-        )
         inference = step(
-            inferring, dynacom.inferContacts, parts, corners, needed, exact, options.detection
+            inferring,
+            dynacom.inferContacts,
+            parts,
+            corners,
+            needed,
+            derived.isExact(),
+            options.detection,
         )
         schedule, ground = inference.schedule, inference.ground
         analysis = step(distributing, dynacom.analyzeMotion, parts.robot, motion, schedule, **how)

@@ -44,7 +44,7 @@ def measure_trial(trial):
 def measure(folder, sensitivity):
     """All figures: section -> name -> figures."""
     trials = [truth_trials.read_trial(path) for path in sorted(folder.glob("*.npz"))]
-    figures = {"date": datetime.date.today().isoformat(), "trials": {}}
+    figures = {"trials": {}}
     for trial in trials:
         print(f"{trial.name} ...", flush=True)
         figures["trials"][trial.name] = measure_trial(trial)
@@ -87,8 +87,10 @@ def written(value, indent=0):
 
 
 def record(figures, path):
-    """Keeps the figures; sections that were not measured now stay as they are."""
+    """Keeps the figures with today's date; sections that were not measured now stay as they are."""
     kept = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    dates = kept.get("dates", {}) | dict.fromkeys(figures, datetime.date.today().isoformat())
+    figures = {"dates": dates} | figures
     path.write_text(written(kept | rounded(figures)) + "\n", encoding="utf-8")
 
 

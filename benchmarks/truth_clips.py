@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from truth_metrics import compare_changes, share
+from truth_scores import score_verdict
 
 import dynacom
 
@@ -119,7 +120,7 @@ def score_sample(report):
         "within": share(int((residual <= LIMITS).all(axis=1).sum()), len(residual)),
         "fast": share(int((active & (speed > FAST)).sum()), int(active.sum())),
         "fastest": float(speed[active].max()) if active.any() else None,
-        "codes": list(report.summary["codes"]),
+        **score_verdict(report),
     }
 
 

@@ -104,18 +104,26 @@ def filter_table(figures, thresholds):
     return table(["trial", "contacts", *titles], rows)
 
 
+VERDICT = ["verdict", "distance [mm]", "codes"]
+
+
 def status_table(figures, thresholds):
     rows = [
         [
             name,
             cutoff,
             ", ".join(f"{key} {value:.0f}" for key, value in case["statuses"].items()),
-            ", ".join(case["codes"]),
+            *verdict_cells(case),
         ]
         for name, cutoff, cases in variants(figures, thresholds)
         for case in [cases["found"]["default"]]
     ]
-    return table(["trial", "filter", "statuses", "codes"], rows)
+    return table(["trial", "filter", "statuses", *VERDICT], rows)
+
+
+def verdict_cells(row):
+    codes = [] if row["verdict"] == "feasible" else row["codes"]
+    return [row["verdict"], numbers([row["distance"]], 1), ", ".join(codes)]
 
 
 def clip_table(figures, thresholds):
@@ -130,7 +138,7 @@ def clip_table(figures, thresholds):
         "found",
     ]
     head += ["largest: thresholds", "found", "within limits: thresholds", "found"]
-    head += ["faster than 1 m/s", "fastest", "codes"]
+    head += ["faster than 1 m/s", "fastest", *VERDICT]
 
     def pair(name, key, form):
         return [
@@ -148,7 +156,7 @@ def clip_table(figures, thresholds):
             [name, *pair(name, "force_rms", ".3f"), ratio, f"{row['force_bound']:.3f}"]
             + pair(name, "torque_rms", ".3f")
             + [*pair(name, "force_largest", ".2f"), *pair(name, "within", ".0f")]
-            + [f"{row['fast']:.1f} %", numbers([row["fastest"]], 2), ", ".join(row["codes"])]
+            + [f"{row['fast']:.1f} %", numbers([row["fastest"]], 2), *verdict_cells(row)]
         )
     text = table(head, rows)
     if unread:
@@ -224,10 +232,17 @@ TABLES = {
 }
 
 
+def write_dates(dates):
+    """When the sections were measured: some take long, and may be older than the others."""
+    last = max(dates.values())
+    older = [f"{section} on {date}" for section, date in dates.items() if date != last]
+    return f"{last} ({', '.join(older)})" if older else last
+
+
 def page(figures, thresholds):
     """The text of docs/truth.md."""
     tables = {name: write(figures, thresholds) for name, write in TABLES.items()}
-    dates = {"date": figures["date"], "before": thresholds["date"]}
+    dates = {"date": write_dates(figures["dates"]), "before": thresholds["date"]}
     template = TEMPLATE.read_text(encoding="utf-8")
     return template.format(**dates, **tables, none=NONE)
 

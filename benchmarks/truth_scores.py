@@ -96,7 +96,17 @@ def score(report, trial):
         **score_contacts(report, trial),
         **score_forces(report, trial),
         "statuses": {name: value for name, value in statuses.items() if value},
+        **score_verdict(report),
+    }
+
+
+def score_verdict(report):
+    """Verdict, codes, and the root mean square of the distance to a feasible motion [mm]."""
+    distance = report.summary["distance"]
+    return {
+        "verdict": report.summary["verdict"],
         "codes": list(report.summary["codes"]),
+        "distance": None if distance is None else 1e3 * distance["rms"],
     }
 
 

@@ -83,12 +83,13 @@ void exposeCentroidalFilter() {
       "How far a motion is from a feasible one: the CentroidalChange d(t) of the CoM's path and\n"
       "h(t) of the angular momentum about it that minimises the integral of\n"
       "|d|^2/com^2 + |d''|^2/com_acceleration^2 + |h|^2/angular_momentum^2 while contacts can\n"
-      "give the wrench of each frame, (f + m d'', t + h' + d x (f + m d'')) about the CoM of\n"
+      "give the wrench of each frame, (f + m d'', tau + h' + d x (f + m d'')) about the CoM of\n"
       "before. By the alternating direction method of multipliers (Boyd et al. 2011).\n"
       "parts: of splitContacts; motions: of computeContactMotions for parts.robot; dynamics: of\n"
       "analyzeMotion for it; schedule: of the parts; free: (T,), frames of which nothing is\n"
       "asked; threads: as in analyzeMotion. Raises ValueError if settings are not valid, the\n"
-      "schedule names a part that there is not, sizes differ, or numbers are not finite.");
+      "schedule names a part that there is not, sizes differ, numbers are not finite, or there\n"
+      "are more than 32 parts.");
 }
 
 }  // namespace dynacom::python

@@ -61,9 +61,12 @@ void exposeCollisionPoints() {
       "Where a link of a robot may touch something besides the contacts: balls, of which\n"
       "some have the radius 0.",
       bp::no_init)
-      .def("__init__", bp::make_constructor(&makeBody, bp::default_call_policies(),
-                                            (bp::arg("link"), bp::arg("joint"), bp::arg("points"),
-                                             bp::arg("radius"))))
+      .def("__init__",
+           bp::make_constructor(
+               &makeBody, bp::default_call_policies(),
+               (bp::arg("link"), bp::arg("joint"), bp::arg("points"), bp::arg("radius"))),
+           "link: its name; joint: index of the joint that moves it; points: centres of the balls\n"
+           "in the joint's frame, (N, 3) [m]; radius: of each, (N,) [m].")
       .def_readonly("link", &BodyPoints::link, "Its name")
       .def_readonly("joint", &BodyPoints::joint, "Index of the joint that moves it")
       .add_property("points", &Rows<&BodyPoints::points>::get,
@@ -93,7 +96,7 @@ void exposeCollisionPoints() {
       "Left out is what lies within 0.12 m of a contact's surface, on its joint or one that\n"
       "carries or is carried by it. folders: where packages are looked for, besides the file's\n"
       "folder and those around it. Raises ValueError if the URDF cannot be read; meshes that\n"
-      "cannot are listed as missing.");
+      "cannot are listed as missing. Raises NotReadyError before initialize().");
 }
 
 }  // namespace dynacom::python

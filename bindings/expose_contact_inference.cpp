@@ -242,7 +242,7 @@ void exposeContactInference() {
           "ValueError if sizes differ.");
   bp::def("gatherParts", &gatherSchedule, (bp::arg("robot"), bp::arg("parts"), bp::arg("schedule")),
           "The same of a ContactSchedule: a contact is active if any of its parts is, and as\n"
-          "probable as its most probable part.");
+          "probable as its most probable part. Raises ValueError if sizes differ.");
   bp::def("inferContacts", &infer,
           (bp::arg("parts"), bp::arg("motions"), bp::arg("dynamics"), bp::arg("exact"),
            bp::arg("settings") = Settings(), bp::arg("recorded") = bp::object()),
@@ -251,7 +251,8 @@ void exposeContactInference() {
           "the motion needs. motions: of computeContactMotions for parts.robot; dynamics: of\n"
           "analyzeMotion for it, with whatever schedule; exact: whether the motion is free of\n"
           "noise; recorded: a ContactSchedule of the whole robot's contacts, within which the\n"
-          "parts are found. Raises ValueError if settings are not valid or sizes differ.");
+          "parts are found. Raises ValueError if settings are not valid, sizes differ, or there\n"
+          "are more than 32 parts.");
 }
 
 }  // namespace dynacom::python

@@ -98,7 +98,8 @@ void exposeContactSchedule() {
           (bp::arg("robot"), bp::arg("motion"), bp::arg("threads") = 0,
            bp::arg("lanes") = kMaximalLanes),
           "A ContactMotion for each contact that a robot knows, in its order; threads and lanes\n"
-          "as in analyzeMotion. Raises ValueError if the motion is not valid.");
+          "as in analyzeMotion. Raises ValueError if the motion is not valid,\n"
+          "NotReadyError before initialize().");
 }
 
 }  // namespace dynacom::python

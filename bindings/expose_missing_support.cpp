@@ -69,7 +69,8 @@ void exposeMissingSupport() {
       "The MissingSupport of what analyzeMotion and, with the same settings, judgeMotion found:\n"
       "frames beyond the limit of a fault that is about forces, for settings.interruption and\n"
       "longer, but for interruptions that are shorter. None where nothing is missing or the\n"
-      "outcome is 'unknown'. Raises ValueError if settings are not valid or sizes differ.");
+      "outcome is 'unknown'. Raises ValueError if settings are not valid or sizes differ,\n"
+      "NotReadyError before initialize().");
 }
 
 }  // namespace dynacom::python

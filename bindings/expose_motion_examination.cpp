@@ -115,10 +115,10 @@ void exposeMotionExamination() {
       bp::no_init)
       .def_readonly("derived", &Examination::derived, "The DerivedMotion")
       .add_property("contacts", &Elements<&Examination::contacts>::get,
-                    "A ContactMotion for each contact")
+                    "A ContactMotion for each contact, with velocities relative to the ground")
       .add_property("parts", &getParts, "A PartRobot.Part for each part of the contacts")
       .add_property("part_motions", &Elements<&Examination::part_motions>::get,
-                    "A ContactMotion for each of them, with velocities relative to the ground")
+                    "The same of each of them")
       .def_readonly("inference", &Examination::inference, "The ContactInference, of the parts")
       .add_property("ground", &Rows<&Examination::ground>::get,
                     "Height of the ground under each contact's lowest part, (T, C) [m]; NaN where\n"

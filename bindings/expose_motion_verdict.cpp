@@ -127,6 +127,10 @@ void exposeMotionVerdict() {
                      "time without fault before and after them [s]")
       .def_readwrite("repairable_distance", &Settings::repairable_distance,
                      "A motion is repairable up to this distance to feasible, root mean square [m]")
+      .def_readwrite("repairable_depth", &Settings::repairable_depth,
+                     "As long as no contact is deeper below its ground [m]")
+      .def_readwrite("repairable_slide", &Settings::repairable_slide,
+                     "Or slides farther in a row of frames [m]")
       .def_readwrite("repairable_largest_distance", &Settings::repairable_largest_distance,
                      "And up to this largest one [m]")
       .def(SettingsVisitor<Settings>());

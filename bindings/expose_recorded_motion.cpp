@@ -13,12 +13,9 @@ Eigen::MatrixXd toColumns(const bp::object& rows) {
 }
 
 std::shared_ptr<RecordedMotion> makeRecorded(const Eigen::VectorXd& time, const Eigen::MatrixXd& q,
-                                             const bp::object& quaternion_error,
                                              const bp::object& v, const bp::object& a,
                                              const bp::object& schedule) {
   RecordedMotion recorded{time, q.transpose()};
-  if (!quaternion_error.is_none())
-    recorded.quaternion_error = bp::extract<Eigen::VectorXd>(quaternion_error)();
   recorded.v = toColumns(v);
   recorded.a = toColumns(a);
   if (!schedule.is_none()) recorded.schedule = bp::extract<ContactSchedule>(schedule)();
@@ -28,11 +25,6 @@ std::shared_ptr<RecordedMotion> makeRecorded(const Eigen::VectorXd& time, const 
 template <Eigen::MatrixXd RecordedMotion::*member>
 bp::object getRows(const RecordedMotion& recorded) {
   return (recorded.*member).cols() == 0 ? bp::object() : Rows<member>::get(recorded);
-}
-
-bp::object getQuaternionError(const RecordedMotion& recorded) {
-  const bool is_there = recorded.quaternion_error.size() > 0;
-  return is_there ? bp::object(recorded.quaternion_error) : bp::object();
 }
 
 bp::object getSchedule(const RecordedMotion& recorded) {
@@ -73,17 +65,13 @@ void exposeRecordedMotion() {
       "RecordedMotion", "A motion as it was recorded, before any filter: one row per frame.",
       bp::no_init)
       .def("__init__",
-           bp::make_constructor(
-               &makeRecorded, bp::default_call_policies(),
-               (bp::arg("time"), bp::arg("q"), bp::arg("quaternion_error") = bp::object(),
-                bp::arg("v") = bp::object(), bp::arg("a") = bp::object(),
-                bp::arg("schedule") = bp::object())),
-           "time: (T,) [s]; q: (T, nq), with quaternions of norm 1; quaternion_error: |norm - 1|\n"
-           "of the root's before, (T,); v: (T, nv); a: (T, nv); schedule: a ContactSchedule.\n"
-           "None stands for what was not recorded.")
+           bp::make_constructor(&makeRecorded, bp::default_call_policies(),
+                                (bp::arg("time"), bp::arg("q"), bp::arg("v") = bp::object(),
+                                 bp::arg("a") = bp::object(), bp::arg("schedule") = bp::object())),
+           "time: (T,) [s]; q: (T, nq), with quaternions of norm 1; v: (T, nv); a: (T, nv);\n"
+           "schedule: a ContactSchedule. None stands for what was not recorded.")
       .add_property("time", getter(&RecordedMotion::time), "(T,), strictly increasing [s]")
       .add_property("q", &Rows<&RecordedMotion::q>::get, "Configurations, (T, nq)")
-      .add_property("quaternion_error", &getQuaternionError, "(T,), or None for zeros")
       .add_property("v", &getRows<&RecordedMotion::v>, "Velocities, (T, nv), or None")
       .add_property("a", &getRows<&RecordedMotion::a>, "Accelerations, (T, nv), or None")
       .add_property("schedule", &getSchedule, "The ContactSchedule, or None")
@@ -105,7 +93,9 @@ void exposeRecordedMotion() {
       .def_readonly("is_automatic", &DerivedMotion::is_automatic,
                     "Whether the cut-off, or that there is none, was chosen for the noise")
       .def_readonly("noise", &DerivedMotion::noise,
-                    "estimateAccelerationNoise; NaN where no cut-off had to be chosen [g]")
+                    "estimateAccelerationNoise of what was recorded; NaN of few frames [g]")
+      .def("isExact", &DerivedMotion::isExact,
+           "Whether it is free of noise, and was not filtered, or for rounding only")
       .def_readonly("thinned_noise", &DerivedMotion::thinned_noise,
                     "The same of about kThinnedRate frames a second, where there are more [g]")
       .add_property("unsure", &getUnsure,

@@ -25,9 +25,8 @@ namespace {
 // μ of bodies where nothing is known of any ground.
 constexpr double kBodyFriction = 0.7;
 
-std::string nameCorner(const Eigen::Vector2d& corner) {
-  return std::string(corner.x() > 0. ? "front" : "rear") + (corner.y() > 0. ? "_left" : "_right");
-}
+// Names of Contact6D::getCorners(), also of those that coincide on an edge without width.
+constexpr const char* kCorners[] = {"front_left", "rear_left", "rear_right", "front_right"};
 
 // A new frame of the model, and its name.
 std::string addFrame(pinocchio::Model& model, pinocchio::JointIndex joint,
@@ -246,6 +245,25 @@ std::size_t internal::ContactSplit::countContacts() const {
   return countContactsOf(parts, bodies.size());
 }
 
+std::vector<std::string> internal::ContactSplit::nameContacts() const {
+  std::vector<std::string> names(countContacts());
+  std::vector<int> count(names.size(), 0);
+  for (const PartRobot::Part& part : parts) {
+    if (part.contact >= names.size()) continue;
+    // One that is alone has its contact's name, see splitContacts().
+    const bool is_alone = count[part.contact]++ == 0;
+    names[part.contact] = is_alone ? part.name : part.name.substr(0, part.name.rfind('.'));
+  }
+  return names;
+}
+
+double internal::findBodyFriction(const std::vector<FixedContact>& points) {
+  if (points.empty()) return kBodyFriction;
+  double least = std::numeric_limits<double>::infinity();
+  for (const FixedContact& point : points) least = std::min(least, settingsOf(*point.contact).mu);
+  return least;
+}
+
 internal::ContactSplit internal::splitCarrier(const DynaCoM& robot,
                                               const std::vector<BodyPoints>& bodies) {
   const pinocchio::Model& model = robot.getModel();
@@ -265,7 +283,7 @@ internal::ContactSplit internal::splitCarrier(const DynaCoM& robot,
       part.weights = std::sqrt(double(corners.cols())) * surface->getSettings().weights.head<3>();
       part.world_aligned = true;
       for (Eigen::Index i = 0; i < corners.cols(); ++i) {
-        part.frame_name = whole.name + "." + nameCorner(corners.col(i));
+        part.frame_name = whole.name + "." + kCorners[i];
         const Eigen::Vector3d corner(corners(0, i), corners(1, i), 0.);
         split.parts.push_back({part.frame_name, k, 0});
         points.push_back({part.frame_name, std::make_shared<ContactPoint>(part), whole.joint,
@@ -285,9 +303,7 @@ internal::ContactSplit internal::splitCarrier(const DynaCoM& robot,
   }
 
   ContactPointSettings point;
-  point.mu = points.empty() ? kBodyFriction : std::numeric_limits<double>::infinity();
-  for (const FixedContact& part : points)
-    point.mu = std::min(point.mu, settingsOf(*part.contact).mu);
+  point.mu = findBodyFriction(points);
   if (!points.empty()) point.weights = settingsOf(*points.front().contact).weights;
   point.world_aligned = true;
   for (const BodyPoints& body : bodies) {

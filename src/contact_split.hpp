@@ -17,10 +17,15 @@ struct ContactSplit {
   Carrier carrier;  // its contacts are the parts, in the same order
 
   std::size_t countContacts() const;
+  /// The names of the contacts, which those of their parts begin with.
+  std::vector<std::string> nameContacts() const;
 };
 
 /// @throws as splitContacts()
 ContactSplit splitCarrier(const DynaCoM& robot, const std::vector<BodyPoints>& bodies = {});
+
+/// The friction of links: the least of some points, which are ContactPoints; 0.7 if there are none.
+double findBodyFriction(const std::vector<FixedContact>& points);
 
 /// @param contacts  the names of the contacts that were split
 ContactSchedule gatherParts(const std::vector<std::string>& contacts, const ContactSplit& split,

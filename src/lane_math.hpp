@@ -8,7 +8,8 @@
 #include <vector>
 
 // Numbers of several frames at once, one in each lane of a SIMD register, and how they are read and
-// written. For what is compiled for one width of registers alone, and shows nothing of this.
+// written. Only for sources that are compiled once for each width of registers: no other header may
+// include it.
 
 namespace dynacom::lanes {
 

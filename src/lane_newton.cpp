@@ -15,8 +15,7 @@ constexpr int kNormal = Cone::kNormal;
 constexpr double kSlacks[DualNewton::kAttempts][2] = {{1e-5, 1e-8}, {1e-4, 1e-9}};
 // How many steps a search may take.
 constexpr int kMaximalSteps = 20;
-// How often an answer is corrected, beginning with none; out of reach more often, because there
-// what is missing is to be accurate, too.
+// How often an answer is corrected: where no inequality is active, and else.
 constexpr int kFreeCorrections = 2;
 constexpr int kCorrections = 3;
 
@@ -126,7 +125,7 @@ DualNewton::DualNewton(const std::vector<Contact>& contacts) : cones_(contacts.s
 
 // Enters the state in which all contacts that are there bear a load and no component is at its
 // bound, from which the first step leads to the closed form for forces without inequalities; with
-// multipliers of zero. Where a contact is not there, it has the state that it keeps.
+// multipliers of zero.
 void DualNewton::begin() {
   setZero(multipliers_);
   for (Cone& cone : cones_) {
@@ -459,7 +458,7 @@ Mask DualNewton::isInside() const {
 }
 
 Mask DualNewton::provesItself() const {
-  Lanes costs = kRounding;
+  Lanes costs = kRounding;  // of what bears nothing
   for (const Cone& cone : cones_)
     if (cone.is_there)
       for (int i = 0; i < cone.size; ++i) costs = stdx::max(costs, stdx::abs(cone.force[i]));

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "check.hpp"
+#include "nan.hpp"
 #include "motion_windows.hpp"
 #include "standard_gravity.hpp"
 
@@ -72,7 +73,7 @@ std::optional<MissingSupport> findMissingSupport(const DynaCoM& robot,
   missing.intervals = findIntervals(analysis.time, beyond, settings.interruption);
   if (missing.intervals.empty()) return std::nullopt;
 
-  const double weight = robot.getMass() * internal::kStandardGravity;
+  const double weight = robot.getMass() * internal::findUnitGravity(robot.getSettings().gravity);
   const Eigen::VectorXd& outside = verdict[MotionFault::CoPOutside].measured;
   for (const MissingSupport::Interval& interval : missing.intervals) {
     const Eigen::Index size = interval.last - interval.first + 1;
@@ -82,8 +83,10 @@ std::optional<MissingSupport> findMissingSupport(const DynaCoM& robot,
     for (Eigen::Index frame = interval.first; frame <= interval.last; ++frame) {
       if (verdict.unsure[frame]) continue;
       const auto residual = analysis.residual.col(frame);
-      missing.force = std::max(missing.force, residual.head<3>().norm() / weight);
-      missing.torque = std::max(missing.torque, residual.tail<3>().norm() / weight);
+      missing.force =
+          std::max(missing.force, internal::orInfinity(residual.head<3>().norm() / weight));
+      missing.torque =
+          std::max(missing.torque, internal::orInfinity(residual.tail<3>().norm() / weight));
     }
   }
   missing.share = double(missing.frames) / double(frames);

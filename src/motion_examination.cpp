@@ -41,12 +41,6 @@ namespace {
 using internal::ContactSplit;
 using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 
-// Velocities as the ground sees them, which may be a treadmill.
-void makeRelative(const Eigen::Vector3d& ground_velocity, std::vector<ContactMotion>& motions) {
-  if (ground_velocity.isZero(0.)) return;
-  for (ContactMotion& moved : motions) moved.velocity.colwise() -= ground_velocity;
-}
-
 // The ground under each contact's lowest part.
 Eigen::MatrixXd findGround(const std::vector<ContactMotion>& contacts,
                            const std::vector<PartRobot::Part>& parts,
@@ -140,9 +134,6 @@ void widen(const Eigen::VectorXd& time, const Mask& frames, double cutoff,
 // Links count if they leave so much less of the frames in which something is missing. A few frames
 // less may be chance.
 constexpr double kLeastGain = 0.1;
-// And they are looked for if something is missing in more of the frames than this: the verdict
-// bears as many.
-constexpr double kMuch = 0.02;
 // Who sits lacks more than this [m g], [m g m], where the seat is not known; who leans lacks less.
 constexpr double kSeated = 0.1;
 
@@ -156,18 +147,22 @@ struct SweptMotion {
   MotionAnalysis analysis;
 };
 
+// Velocities as the ground sees them, which may be a treadmill.
+void makeRelative(const Eigen::Vector3d& ground_velocity, SweptMotion& swept) {
+  if (ground_velocity.isZero(0.)) return;
+  for (auto* motions : {&swept.contacts, &swept.parts})
+    for (ContactMotion& moved : *motions) moved.velocity.colwise() -= ground_velocity;
+}
+
 // The frames in which parts cannot give what is needed: more is missing there than verdicts allow
 // in a frame. Verdicts distribute forces for that, and have pyramids for cones.
 Mask findMissing(const ContactSplit& split, const SweptMotion& swept,
                  const ContactInference& inference, const Mask& unsure,
                  const VerdictSettings& settings) {
-  const double gravity = -split.carrier.gravity.z();
-  const double unit = gravity > 0. ? gravity / internal::kStandardGravity : 1.;
-  const double weight = split.carrier.mass * internal::kStandardGravity;
+  const double weight = split.carrier.mass * internal::findUnitGravity(split.carrier.gravity);
   internal::SupportMeter support(split.carrier, swept.parts, swept.analysis);
   const auto isMissing = [&](Eigen::Index frame) {
-    const double force = unit * inference.missing(0, frame);
-    const double torque = unit * inference.missing(1, frame);
+    const double force = inference.missing(0, frame), torque = inference.missing(1, frame);
     const auto active = inference.schedule.active.col(frame);
     if (!active.any()) return std::max(force, torque) > settings.flight_with_support_needed.limit;
     if (force > settings.residual_force.limit || torque > settings.residual_torque.limit)
@@ -184,8 +179,14 @@ Mask findMissing(const ContactSplit& split, const SweptMotion& swept,
   return missing;
 }
 
-bool isMuch(const Mask& missing) {
-  return double(missing.count()) > kMuch * double(missing.size());
+// Whether it lasts for so long somewhere. Each frame lasts until the next one.
+bool isLong(const Mask& missing, const Eigen::VectorXd& time, double duration) {
+  const Eigen::Index last = missing.size() - 1;
+  for (Eigen::Index first = 0, behind = 0; first <= last; first = behind + 1) {
+    for (behind = first; behind <= last && missing[behind];) ++behind;
+    if (behind > first && time[std::min(behind, last)] - time[first] >= duration) return true;
+  }
+  return false;
 }
 
 // Where the ground is under what is at rest on it.
@@ -281,7 +282,7 @@ class MotionExaminer::Workspace::Pipeline {
     found.inference = infer(found.derived, swept);
     if (recorded_.schedule)
       found.inferred = gather(inferFrom(*split_, found.derived, swept, nullptr).schedule);
-    makeRelative(found.inference.ground_velocity, swept.parts);
+    makeRelative(found.inference.ground_velocity, swept);
     distribute(found.inference, swept);
     found.verdict = judge(found.derived, found.inference, swept);
     found.distance = weighDistance(found.derived, found.inference, swept, found.verdict);
@@ -343,10 +344,8 @@ class MotionExaminer::Workspace::Pipeline {
 
   ContactInference inferFrom(const ContactSplit& split, const DerivedMotion& derived,
                              const SweptMotion& swept, const ContactSchedule* recorded) const {
-    const bool exact =
-        derived.cutoff == 0. || (derived.is_automatic && derived.thinned_noise <= kExactNoise);
-    return internal::inferContacts(split, swept.parts, swept.analysis, exact, settings_.detection,
-                                   recorded);
+    return internal::inferContacts(split, swept.parts, swept.analysis, derived.isExact(),
+                                   settings_.detection, recorded);
   }
 
   // Finds contacts with links, where those without do not suffice and some links are low then, and
@@ -361,7 +360,7 @@ class MotionExaminer::Workspace::Pipeline {
                          settings_.verdict);
     };
     const Mask missing = lacks(*split_, found);
-    if (!isMuch(missing)) return found;
+    if (!isLong(missing, swept.motion->time, settings_.verdict.interruption)) return found;
     const std::vector<BodyPoints> bodies =
         internal::screenBodies(model(), *workspace_.data.take(), settings_.bodies, *swept.motion,
                                missing, findLevels(found), settings_.detection.body_reach,
@@ -476,7 +475,7 @@ class MotionExaminer::Workspace::Pipeline {
     CentroidalChange change = internal::distanceToFeasible(
         *split_, swept.parts, swept.analysis, schedule, settings_.filter,
         near_jumps_ || derived.unsure, workspace_.workers);
-    verdict.weighDistance(change, settings_.verdict);
+    verdict.weighDistance(change, time, settings_.verdict);
     return change;
   }
 
@@ -528,7 +527,7 @@ class MotionExaminer::Workspace::Pipeline {
   CutoffSensitivity tryCutoff(double cutoff, const MotionExamination& found) {
     const DerivedMotion derived = internal::rederiveMotion(derivation_, recorded_, cutoff);
     SweptMotion swept = sweep(derived.motion);
-    makeRelative(found.inference.ground_velocity, swept.parts);
+    makeRelative(found.inference.ground_velocity, swept);
     distribute(found.inference, swept);
     MotionVerdict verdict = judge(derived, found.inference, swept);
     weighDistance(derived, found.inference, swept, verdict);

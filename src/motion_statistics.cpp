@@ -153,11 +153,10 @@ MotionStatistics summarizeMotion(const DynaCoM& robot, const Motion& motion,
   internal::requireSize("verdict", verdict.unsure.size(), frames, "frames");
   if (frames == 0) internal::throwInvalid("motion must have at least one frame, got 0");
 
-  const double gravity = -robot.getSettings().gravity.z();
   MotionStatistics statistics = {};
   statistics.frames = frames;
   statistics.mass = robot.getMass();
-  statistics.weight = statistics.mass * (gravity > 0. ? gravity : internal::kStandardGravity);
+  statistics.weight = statistics.mass * internal::findUnitGravity(robot.getSettings().gravity);
   for (const DistributionStatus status : analysis.status) ++statistics.statuses[status];
   statistics.mean_vertical_force = analysis.ground_force.row(2).mean() / statistics.weight;
   if (frames > 1)

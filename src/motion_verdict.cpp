@@ -11,12 +11,14 @@
 #include "motion_judgement.hpp"
 #include "motion_windows.hpp"
 #include "nan.hpp"
+#include "settings_fields.hpp"
 #include "standard_gravity.hpp"
 #include "support_meter.hpp"
 
 namespace dynacom {
 
 using internal::kNaN;
+using internal::orInfinity;
 using internal::requireField;
 using internal::requireSize;
 using internal::throwInvalid;
@@ -26,7 +28,6 @@ namespace {
 using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 using Vector6 = DynaCoM::Vector6;
 
-constexpr double kLever = 1.;
 // How many frames at either side of a jump are unsure at least: differences reach that far.
 constexpr Eigen::Index kJumpFrames = 2;
 
@@ -56,31 +57,32 @@ constexpr Description kDescriptions[kMotionFaults] = {
      "the motion jumps"},
 };
 
-// What else settings have: the name, where it is, and whether it may be 0.
-struct Number {
-  const char* name;
-  double VerdictSettings::*value;
-  bool may_be_zero;
-};
-constexpr Number kNumbers[] = {
-    {"cop_force", &VerdictSettings::cop_force, true},
-    {"linear_speed", &VerdictSettings::linear_speed, false},
-    {"turning_speed", &VerdictSettings::turning_speed, false},
-    {"joint_speed", &VerdictSettings::joint_speed, false},
-    {"jump_time", &VerdictSettings::jump_time, true},
-    {"minimal_window", &VerdictSettings::minimal_window, true},
-    {"interruption", &VerdictSettings::interruption, true},
-    {"repairable_distance", &VerdictSettings::repairable_distance, false},
-    {"repairable_largest_distance", &VerdictSettings::repairable_largest_distance, false},
-};
+// What else settings have.
+const internal::Fields<VerdictSettings>& numbers() {
+  static const internal::Fields<VerdictSettings> all = {
+      {"cop_force", &VerdictSettings::cop_force},
+      {"linear_speed", &VerdictSettings::linear_speed},
+      {"turning_speed", &VerdictSettings::turning_speed},
+      {"joint_speed", &VerdictSettings::joint_speed},
+      {"jump_time", &VerdictSettings::jump_time},
+      {"minimal_window", &VerdictSettings::minimal_window},
+      {"interruption", &VerdictSettings::interruption},
+      {"repairable_distance", &VerdictSettings::repairable_distance},
+      {"repairable_largest_distance", &VerdictSettings::repairable_largest_distance},
+      {"repairable_depth", &VerdictSettings::repairable_depth},
+      {"repairable_slide", &VerdictSettings::repairable_slide},
+  };
+  return all;
+}
 
 const Description& describe(MotionFault fault) {
   return kDescriptions[static_cast<std::size_t>(fault)];
 }
 
-// What is not a number is more than anything.
-double orInfinity(double size) {
-  return std::isnan(size) ? std::numeric_limits<double>::infinity() : size;
+// Whether accelerations decide it.
+bool isOfForces(MotionFault fault) {
+  return fault == MotionFault::ResidualForce || fault == MotionFault::ResidualTorque ||
+         fault == MotionFault::CoPOutside || fault == MotionFault::FlightWithSupportNeeded;
 }
 
 // The height of the ground under contact k in a frame.
@@ -93,14 +95,15 @@ double slidingSpeed(const ContactMotion& contact, Eigen::Index frame) {
   return contact.velocity.col(frame).head<2>().norm();
 }
 
+// @param unmeasured   how many frames do not count
 // @param nameSubject  gives the finding's subject for the frame of the worst
 template <class Function>
 MotionFinding sumUp(Eigen::VectorXd measured, const FaultLimit& limit, const Eigen::VectorXd& time,
-                    Function nameSubject) {
+                    Eigen::Index unmeasured, Function nameSubject) {
   Eigen::Index frame = 0;
   const double worst = measured.maxCoeff(&frame);
   const Eigen::Index beyond = (measured.array() > limit.limit).count();
-  const bool holds = double(beyond) > limit.allowed_share * double(time.size());
+  const bool holds = double(beyond) > limit.allowed_share * double(time.size() - unmeasured);
   std::string subject = worst > 0. ? nameSubject(frame) : "";
   return {std::move(measured), beyond, worst, time[frame], holds, std::move(subject)};
 }
@@ -133,8 +136,19 @@ void measureNormals(const internal::JudgedMotion& judged, const VerdictSettings&
   }
   constexpr MotionFault fault = MotionFault::DownwardNormal;
   verdict.findings[static_cast<std::size_t>(fault)] = sumUp(
-      std::move(measured), settings[fault], time,
+      std::move(measured), settings[fault], time, 0,
       [&](Eigen::Index frame) { return contacts[whose[static_cast<std::size_t>(frame)]].name; });
+}
+
+// The longest way that is gone faster than a limit, of what is measured as a speed.
+double findLongestWay(const MotionFinding& speed, double limit, const Eigen::VectorXd& time) {
+  double longest = 0., way = 0.;
+  for (Eigen::Index frame = 0; frame + 1 < time.size(); ++frame) {
+    const bool is_fast = speed.measured[frame] > limit;
+    way = is_fast ? way + speed.measured[frame] * (time[frame + 1] - time[frame]) : 0.;
+    longest = std::max(longest, way);
+  }
+  return longest;
 }
 
 bool holdsAny(const MotionVerdict& verdict) {
@@ -152,7 +166,7 @@ void conclude(const Eigen::VectorXd& time, const VerdictSettings& settings,
              verdict.findings[k].measured.array() > settings[static_cast<MotionFault>(k)].limit;
   const Mask jumped =
       verdict[MotionFault::Discontinuity].measured.array() > settings.discontinuity.limit;
-  verdict.windows = internal::findWindows(time, beyond, jumped, settings);
+  verdict.windows = internal::findWindows(time, beyond, jumped, verdict.unsure, settings);
   Eigen::Index inside = 0;
   for (const MotionWindow& window : verdict.windows) inside += window.last - window.first + 1;
   verdict.feasible_share = double(inside) / double(time.size());
@@ -234,12 +248,9 @@ void VerdictSettings::validate() const {
     requireField(limit.allowed_share >= 0. && limit.allowed_share <= 1.,
                  (field + ".allowed_share").c_str(), "from 0 to 1", limit.allowed_share);
   }
-  for (const Number& number : kNumbers) {
-    const double value = this->*number.value;
-    requireField(std::isfinite(value) && (value > 0. || (number.may_be_zero && value == 0.)),
-                 (std::string("VerdictSettings.") + number.name).c_str(),
-                 number.may_be_zero ? "finite and >= 0" : "finite and > 0", value);
-  }
+  internal::requirePositive("VerdictSettings", *this, numbers(),
+                            {&VerdictSettings::cop_force, &VerdictSettings::jump_time,
+                             &VerdictSettings::minimal_window, &VerdictSettings::interruption});
 }
 
 std::string VerdictSettings::to_string() const { return internal::concat(*this); }
@@ -249,9 +260,7 @@ bool VerdictSettings::operator==(const VerdictSettings& other) const {
                      [&](const Description& description) {
                        return this->*description.limit == other.*description.limit;
                      }) &&
-         std::all_of(std::begin(kNumbers), std::end(kNumbers), [&](const Number& number) {
-           return this->*number.value == other.*number.value;
-         });
+         internal::areEqual(*this, other, numbers());
 }
 
 std::ostream& operator<<(std::ostream& out, const VerdictSettings& settings) {
@@ -260,11 +269,7 @@ std::ostream& operator<<(std::ostream& out, const VerdictSettings& settings) {
     const FaultLimit& limit = settings.*description.limit;
     out << description.code << "=(" << limit.limit << ", " << limit.allowed_share << "), ";
   }
-  const char* separator = "";
-  for (const Number& number : kNumbers) {
-    out << separator << number.name << "=" << settings.*number.value;
-    separator = ", ";
-  }
+  internal::write(out, settings, numbers());
   return out << ")";
 }
 
@@ -272,11 +277,17 @@ const MotionFinding& MotionVerdict::operator[](MotionFault fault) const {
   return findings[static_cast<std::size_t>(fault)];
 }
 
-void MotionVerdict::weighDistance(const CentroidalChange& distance,
+void MotionVerdict::weighDistance(const CentroidalChange& distance, const Eigen::VectorXd& time,
                                   const VerdictSettings& settings) {
   if (outcome != MotionOutcome::NotFeasible || !distance.converged) return;
   for (std::size_t k = 0; k < kMotionFaults; ++k)
     if (findings[k].holds && !isMendable(static_cast<MotionFault>(k))) return;
+  const MotionFinding& sunk = (*this)[MotionFault::GroundPenetration];
+  const MotionFinding& sliding = (*this)[MotionFault::FootSliding];
+  if (sunk.holds && sunk.worst > settings.repairable_depth) return;
+  if (sliding.holds &&
+      findLongestWay(sliding, settings.foot_sliding.limit, time) > settings.repairable_slide)
+    return;
   if (distance.rms <= settings.repairable_distance &&
       distance.largest <= settings.repairable_largest_distance)
     outcome = MotionOutcome::Repairable;
@@ -353,7 +364,7 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
   MotionVerdict verdict = {};
   verdict.unsure = judged.unsure;
 
-  const double weight = judged.carrier.mass * internal::kStandardGravity;
+  const double weight = judged.carrier.mass * internal::findUnitGravity(judged.carrier.gravity);
   std::array<Eigen::VectorXd, kMotionFaults> measured;
   for (Eigen::VectorXd& values : measured) values.setZero(frames);
   const auto measure = [&](MotionFault fault) -> Eigen::VectorXd& {
@@ -363,7 +374,7 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
   const auto judgeForces = [&](Eigen::Index frame, bool flies, SupportMeter& support) {
     const auto residual = analysis.residual.col(frame);
     const double force = orInfinity(residual.head<3>().norm() / weight);
-    const double torque = orInfinity(residual.tail<3>().norm() / (weight * kLever));
+    const double torque = orInfinity(residual.tail<3>().norm() / weight);
     if (flies) {
       measure(MotionFault::FlightWithSupportNeeded)[frame] = std::max(force, torque);
       return;
@@ -391,7 +402,7 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
           if (!analysis.contacts[k].active[frame]) continue;
           flies = false;
           if (!judged.near_jumps[frame])
-            sliding = std::max(sliding, slidingSpeed(contacts[k], frame));
+            sliding = std::max(sliding, orInfinity(slidingSpeed(contacts[k], frame)));
         }
         if (!verdict.unsure[frame]) judgeForces(frame, flies, support);
       }
@@ -408,11 +419,14 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
       if (isIt(k)) return contacts[k].name;
     return "";
   };
+  const Eigen::Index unsure = verdict.unsure.count();
   for (std::size_t k = 0; k < kMotionFaults; ++k) {
     const auto fault = static_cast<MotionFault>(k);
     if (fault == MotionFault::DownwardNormal) continue;
-    verdict.findings[k] =
-        sumUp(measured[k], settings[fault], time, [&](Eigen::Index frame) -> std::string {
+    Eigen::Index unmeasured = isOfForces(fault) ? unsure : 0;
+    if (fault == MotionFault::FootSliding) unmeasured = judged.near_jumps.count();
+    verdict.findings[k] = sumUp(
+        measured[k], settings[fault], time, unmeasured, [&](Eigen::Index frame) -> std::string {
           const double worst = measured[k][frame];
           if (fault == MotionFault::Discontinuity) return judged.steps.fastest;
           if (fault == MotionFault::GroundPenetration)
@@ -427,7 +441,8 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
         });
   }
   measureNormals(judged, settings, verdict);
-  if (judged.is_too_short || (!holdsAny(verdict) && verdict.unsure.all()))
+  const bool is_known = frames - unsure >= std::min(kMinimalFrames, frames);
+  if (judged.is_too_short || (!holdsAny(verdict) && !is_known))
     verdict.outcome = MotionOutcome::Unknown;
   else
     conclude(time, settings, verdict);

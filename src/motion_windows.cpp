@@ -17,6 +17,7 @@ struct Run {
 std::vector<MotionWindow> findWindows(const Eigen::VectorXd& time,
                                       const Eigen::Array<bool, Eigen::Dynamic, 1>& beyond,
                                       const Eigen::Array<bool, Eigen::Dynamic, 1>& jumps,
+                                      const Eigen::Array<bool, Eigen::Dynamic, 1>& unsure,
                                       const VerdictSettings& settings) {
   const Eigen::Index frames = time.size();
   std::vector<Run> runs;
@@ -41,9 +42,11 @@ std::vector<MotionWindow> findWindows(const Eigen::VectorXd& time,
   };
   std::vector<MotionWindow> windows;
   for (std::size_t k = 0; k < runs.size(); ++k) {
-    const Eigen::Index first = runs[k].first;
+    Eigen::Index first = runs[k].first;
     while (k + 1 < runs.size() && isShort(runs[k], runs[k + 1])) ++k;
-    const Eigen::Index last = runs[k].behind - 1;
+    Eigen::Index last = runs[k].behind - 1;
+    while (first < last && unsure[first]) ++first;
+    while (first < last && unsure[last]) --last;
     if (time[last] - time[first] >= settings.minimal_window - kTimeRounding)
       windows.push_back({first, last, time[first], time[last]});
   }

@@ -15,9 +15,11 @@ constexpr double kTimeRounding = 1e-9;
 /// @param time    frames, increasing [s]
 /// @param beyond  frames at fault
 /// @param jumps   frames at fault that no window may hold
+/// @param unsure  frames of which forces are not judged, with which no window begins or ends
 std::vector<MotionWindow> findWindows(const Eigen::VectorXd& time,
                                       const Eigen::Array<bool, Eigen::Dynamic, 1>& beyond,
                                       const Eigen::Array<bool, Eigen::Dynamic, 1>& jumps,
+                                      const Eigen::Array<bool, Eigen::Dynamic, 1>& unsure,
                                       const VerdictSettings& settings);
 
 }  // namespace dynacom::internal

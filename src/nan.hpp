@@ -2,12 +2,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <limits>
 
 namespace dynacom::internal {
 
 /// What is not known, or means nothing.
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// What is not a number is more than anything.
+inline double orInfinity(double size) {
+  return std::isnan(size) ? std::numeric_limits<double>::infinity() : size;
+}
 
 /// As Eigen's allFinite(), for long vectors in a fraction of the time: 0 times what is not finite
 /// is NaN, and so is the sum.

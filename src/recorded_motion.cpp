@@ -34,9 +34,9 @@ double largestStep(const Eigen::VectorXd& time) {
   return (time.tail(steps) - time.head(steps)).maxCoeff();
 }
 
-// Estimates the noise, and says which cut-off suits it.
-double chooseCutoff(const internal::Derivation& derivation, const Eigen::VectorXd& time,
-                    const Eigen::MatrixXd& q, DerivedMotion& derived) {
+// Of the configurations as they were recorded.
+void estimateNoise(const internal::Derivation& derivation, const Eigen::VectorXd& time,
+                   const Eigen::MatrixXd& q, DerivedMotion& derived) {
   const auto estimate = [&](Eigen::Index stride) {
     return internal::estimateAccelerationNoise(derivation.model, derivation.findCoM, time, q,
                                                stride);
@@ -48,6 +48,11 @@ double chooseCutoff(const internal::Derivation& derivation, const Eigen::VectorX
     const double thinned = estimate(stride);
     if (!std::isnan(thinned)) derived.thinned_noise = thinned;
   }
+}
+
+// Says which cut-off suits the noise.
+double chooseCutoff(const DerivedMotion& derived) {
+  const double rate = derived.frame_rate;
   if (!(derived.thinned_noise <= kExactNoise))
     return std::isnan(rate) ? kMeasuredCutoff
                             : std::min(kMeasuredCutoff, kMeasuredCutoffPart * rate);
@@ -79,6 +84,11 @@ void markUnsure(const pinocchio::Model& model, pinocchio::Data& data, bool is_fi
 }
 
 }  // namespace
+
+bool DerivedMotion::isExact() const {
+  if (cutoff == 0.) return !(thinned_noise > kExactNoise);
+  return is_automatic && thinned_noise <= kExactNoise;
+}
 
 double findFrameRate(const Eigen::VectorXd& time) {
   const Eigen::Index steps = time.size() - 1;
@@ -124,18 +134,14 @@ DerivedMotion internal::rederiveMotion(const Derivation& derivation, const Recor
   DerivedMotion derived = {};
   derived.mismatch = {kNaN, kNaN};
   derived.frame_rate = findFrameRate(recorded.time);
-  derived.noise = derived.thinned_noise = kNaN;
   const bool is_even = !std::isnan(derived.frame_rate);
   const Eigen::VectorXd time = is_even ? makeEven(recorded.time) : recorded.time;
   derived.is_automatic = std::isnan(cutoff) && recorded.time.size() > 1;
   internal::requireSize("q", recorded.q.rows(), Eigen::Index(model.nq), "components (nq)");
   internal::requireSize("q", recorded.q.cols(), recorded.time.size(), "frames");
-  if (derived.is_automatic) {
-    requireConfigurations(model, recorded.q, recorded.time.size());
-    cutoff = chooseCutoff(derivation, time, recorded.q, derived);
-  } else if (std::isnan(cutoff)) {
-    cutoff = 0.;
-  }
+  requireConfigurations(model, recorded.q, recorded.time.size());
+  estimateNoise(derivation, time, recorded.q, derived);
+  if (std::isnan(cutoff)) cutoff = derived.is_automatic ? chooseCutoff(derived) : 0.;
   if (!(cutoff >= 0.) || !std::isfinite(cutoff))
     throwInvalid("cutoff must be finite and >= 0 Hz, got ", cutoff);
   if (cutoff > 0. && recorded.time.size() > 1) {
@@ -179,7 +185,7 @@ DerivedMotion internal::deriveMotion(const Derivation& derivation, const Recorde
       derived.is_recorded = true;
       derived.mismatch = mismatch;
       derived.frame_rate = findFrameRate(recorded.time);
-      derived.noise = derived.thinned_noise = kNaN;
+      estimateNoise(derivation, recorded.time, recorded.q, derived);
       derived.unsure.setConstant(recorded.time.size(), false);
       return derived;
     }

@@ -37,7 +37,8 @@ std::vector<Run> findRuns(const Eigen::Array<bool, Eigen::Dynamic, 1>& missing,
   std::vector<Run> runs;
   for (Index frame = 0; frame < time.size(); ++frame) {
     if (!missing[frame]) continue;
-    if (!runs.empty() && time[frame] - time[runs.back().behind - 1] < kInterruption)
+    if (!runs.empty() &&
+        (frame == runs.back().behind || time[frame] - time[runs.back().behind - 1] < kInterruption))
       runs.back().behind = frame + 1;
     else
       runs.push_back({frame, frame + 1});
@@ -85,12 +86,11 @@ std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion&
   if (runs.empty()) return seats;
   const double weight = -question.parts.carrier.mass * question.parts.carrier.gravity.z();
   if (!(weight > 0.)) return seats;
+  const std::vector<FixedContact>& points = question.parts.carrier.contacts;
   std::vector<double> part_mu;
-  for (const FixedContact& part : question.parts.carrier.contacts) {
-    const auto* point = dynamic_cast<const ContactPoint*>(part.contact.get());
-    part_mu.push_back(point ? point->getSettings().mu : 0.);
-  }
-  const double body_mu = part_mu.empty() ? 0.7 : *std::min_element(part_mu.begin(), part_mu.end());
+  for (const FixedContact& part : points)
+    part_mu.push_back(dynamic_cast<const ContactPoint&>(*part.contact).getSettings().mu);
+  const double body_mu = findBodyFriction(points);
 
   for (const Run& run : runs) {
     std::vector<Index> frames;

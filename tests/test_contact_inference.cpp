@@ -164,6 +164,15 @@ BOOST_AUTO_TEST_CASE(recorded_contacts_are_kept) {
     BOOST_TEST((feet.active.row(0).array() == recorded.active.row(1).array()).all());
     BOOST_TEST((feet.active.row(1).array() == recorded.active.row(0).array()).all());
   }
+  // A foot that is held up stands, if the record says so, and the ground is up there.
+  Motion on_box = puppet.step(0.);
+  on_box.q.row(12).array() += 0.1;
+  for (const bool is_told : {true, false}) {
+    const ContactInference box = puppet.infer(on_box, {}, is_told ? &recorded : nullptr);
+    BOOST_TEST(box.stances.size() == 8u);
+    for (const Stance& stance : box.stances)
+      BOOST_TEST(stance.on_ground == (is_told || stance.height < 0.05));
+  }
   // Who is not named is never active.
   const ContactSchedule left{{"left"}, ContactSchedule::Matrix::Constant(1, 301, true)};
   BOOST_TEST(!puppet.gather(puppet.infer(puppet.step(0.), {}, &left)).active.row(1).any());

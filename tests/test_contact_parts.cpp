@@ -131,6 +131,22 @@ BOOST_AUTO_TEST_CASE(a_frame_may_have_the_name_of_a_corner_already) {
     BOOST_TEST(part.position.cwiseAbs().maxCoeff() < 1.);
 }
 
+BOOST_AUTO_TEST_CASE(an_edge_without_width_has_corners_of_different_names) {
+  for (const auto size : {&Contact6DSettings::half_length, &Contact6DSettings::half_width}) {
+    DynaCoM robot(singleBody(10., {SE3::Identity()}));
+    Contact6DSettings edge;
+    edge.frame_name = "sole0";
+    edge.mu = 0.5;
+    edge.gu = 0.1;
+    edge.half_length = edge.half_width = 0.1;
+    edge.*size = 0.;
+    robot.addContact(std::make_shared<Contact6D>(edge), "foot");
+    std::set<std::string> names;
+    for (const PartRobot::Part& part : splitContacts(robot).parts) names.insert(part.name);
+    BOOST_TEST(names.size() == 4u);
+  }
+}
+
 BOOST_AUTO_TEST_CASE(forces_of_parts_sum_to_the_contacts_wrench) {
   int inside = 0;
   for (unsigned seed = 1; seed < 6; ++seed) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #define BOOST_TEST_MODULE missing_support
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -201,6 +202,16 @@ BOOST_AUTO_TEST_CASE(amounts_are_the_largest_in_intervals) {
   missing = some.find();
   BOOST_TEST((some.intervals() == Intervals{{2, 5}, {8, 11}}));
   BOOST_TEST(close(missing->force, 0.3));
+}
+
+BOOST_AUTO_TEST_CASE(what_is_no_number_is_missing_without_end) {
+  Case some("..####..####.....#..", 0.3, 0.05);
+  some.settings.interruption = 0.1;
+  some.analysis.residual.col(3).setConstant(std::numeric_limits<double>::quiet_NaN());
+  const auto missing = some.find();
+  BOOST_REQUIRE(missing.has_value());
+  BOOST_TEST(std::isinf(missing->force));
+  BOOST_TEST(std::isinf(missing->torque));
 }
 
 BOOST_AUTO_TEST_CASE(nothing_is_missing_of_what_is_unknown) {

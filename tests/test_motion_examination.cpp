@@ -97,7 +97,6 @@ bool sameBits(const std::vector<double>& one, const std::vector<double>& other) 
 BOOST_AUTO_TEST_CASE(an_examination_is_its_steps) {
   const Clips clips;
   RecordedMotion recorded = clips.make(2);
-  recorded.quaternion_error = VectorXd::LinSpaced(recorded.time.size(), 0., 0.002);
   for (const bool scheduled : {true, false}) {
     if (!scheduled) recorded.schedule.reset();
     ExaminationSettings settings;

@@ -6,6 +6,7 @@
 
 #include "dynacom/contact6d.hpp"
 #include "dynacom/motion_verdict.hpp"
+#include "feet.hpp"
 #include "random_robot.hpp"
 
 using namespace dynacom;
@@ -290,6 +291,54 @@ BOOST_AUTO_TEST_CASE(what_is_near_a_jump_is_not_measured) {
   BOOST_TEST(stand.judge().unsure.segment(47, 6).all());
 }
 
+BOOST_AUTO_TEST_CASE(windows_neither_begin_nor_end_where_nothing_is_known) {
+  Stand stand;
+  stand.settings.minimal_window = 0.2;
+  stand.unsure.setConstant(100, false);
+  stand.unsure.head(30).setConstant(true);
+  stand.unsure.segment(60, 10).setConstant(true);
+  stand.unsure.tail(5).setConstant(true);
+  const MotionVerdict verdict = stand.judge();
+  BOOST_REQUIRE(verdict.windows.size() == 1u);
+  BOOST_TEST(verdict.windows[0].first == 30);
+  BOOST_TEST(verdict.windows[0].last == 94);
+  BOOST_TEST(verdict.feasible_share == 0.65);
+  stand.unsure.setConstant(true);
+  stand.unsure.segment(50, 10).setConstant(false);
+  BOOST_TEST(stand.judge().windows.empty());
+}
+
+BOOST_AUTO_TEST_CASE(limits_are_parts_of_the_weight_that_there_is) {
+  // Lifted by what a sixth of the weight on Earth gives, wherever it stands.
+  for (const double gravity : {9.81, 1.62}) {
+    Stand stand;
+    stand.model.gravity.linear().z() = -gravity;
+    stand.robot = DynaCoM(stand.model);
+    for (const char* frame : {"sole0", "sole1"}) stand.robot.addContact(makeSole(frame), frame);
+    stand.motion.a.row(2).setConstant(-1.2 * gravity);
+    const MotionVerdict verdict = stand.judge();
+    BOOST_TEST(close(verdict[MotionFault::ResidualForce].worst, 0.2, 1e-9));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(frames_that_are_unsure_count_neither_for_nor_against) {
+  // Four frames of a hundred may be pulled down; of the fifty that are known, two.
+  Stand stand;
+  stand.motion.a.row(2).segment(10, 4).setConstant(-12.);
+  BOOST_TEST(stand.judge().isFeasible());
+  stand.unsure.setConstant(100, false);
+  stand.unsure.tail(50).setConstant(true);
+  BOOST_TEST(stand.judge()[MotionFault::ResidualForce].holds);
+  BOOST_TEST(!stand.judge().isFeasible());
+  stand.motion.a.row(2).segment(12, 2).setZero();
+  BOOST_TEST(stand.judge().isFeasible());
+  // A handful of known frames is too few to call a motion feasible.
+  stand.unsure.tail(94).setConstant(true);
+  BOOST_TEST(stand.judge().isFeasible());
+  stand.unsure.tail(95).setConstant(true);
+  BOOST_TEST((stand.judge().outcome == MotionOutcome::Unknown));
+}
+
 BOOST_AUTO_TEST_CASE(what_is_unsure_is_not_measured) {
   Stand stand;
   stand.motion.a.row(2).setConstant(-20.);
@@ -376,10 +425,10 @@ BOOST_AUTO_TEST_CASE(windows_are_what_is_long_and_without_fault) {
   // Faults every few frames are no short interruptions.
   for (Index frame = 6; frame < 60; frame += 3) fail(frame, 1);
   BOOST_TEST(windows({{63, 99}}));
-  // A jump ends a window, however short it is.
+  // A jump ends a window, however short it is, and with it what is unsure beside it.
   stand.ground.setZero();
   stand.recorded.q.rightCols(50).row(0).setConstant(1.);  // two frames, 0.08 s
-  BOOST_TEST(windows({{0, 48}, {51, 99}}));
+  BOOST_TEST(windows({{0, 42}, {57, 99}}));
   // Frames that are unsure neither end one, nor are they beyond.
   stand.recorded.q = stand.motion.q;
   stand.motion.a.row(2).segment(40, 20).setConstant(-20.);
@@ -436,7 +485,7 @@ BOOST_AUTO_TEST_CASE(what_is_close_to_a_feasible_motion_is_repairable) {
     change.rms = rms;
     change.largest = largest;
     change.converged = converged;
-    verdict.weighDistance(change, stand.settings);
+    verdict.weighDistance(change, stand.motion.time, stand.settings);
     return verdict.outcome;
   };
   Stand pulled;
@@ -452,7 +501,7 @@ BOOST_AUTO_TEST_CASE(what_is_close_to_a_feasible_motion_is_repairable) {
 
   // A repairable motion is no feasible one, and what speaks against it stays.
   MotionVerdict verdict = pulled.judge();
-  verdict.weighDistance(CentroidalChange(), pulled.settings);
+  verdict.weighDistance(CentroidalChange(), pulled.motion.time, pulled.settings);
   BOOST_TEST((verdict.outcome == MotionOutcome::Repairable));
   BOOST_TEST(!verdict.isFeasible());
   BOOST_TEST(verdict.getCodes().at(0) == "residual_force");
@@ -464,6 +513,22 @@ BOOST_AUTO_TEST_CASE(what_is_close_to_a_feasible_motion_is_repairable) {
   Stand unsure;
   unsure.unsure.setConstant(100, true);
   BOOST_TEST((weigh(unsure, 0., 0.) == MotionOutcome::Unknown));
+
+  // What slides or sinks far is not near a motion that does not, although its forces are possible.
+  Stand sliding;
+  sliding.motion.v.row(0).segment(10, 20).setConstant(0.249);
+  BOOST_TEST(holdsAlone(sliding.judge(), MotionFault::FootSliding, 20, 0.249, 0.1));
+  BOOST_TEST((weigh(sliding, 0., 0.) == MotionOutcome::Repairable));  // by 4.98 cm
+  sliding.motion.v.row(0).segment(10, 20).setConstant(0.251);
+  BOOST_TEST((weigh(sliding, 0., 0.) == MotionOutcome::NotFeasible));
+  sliding.motion.v.row(0).segment(20, 1).setZero();  // twice by less
+  BOOST_TEST((weigh(sliding, 0., 0.) == MotionOutcome::Repairable));
+  Stand sunk;
+  sunk.ground.setConstant(0.069);
+  BOOST_TEST(holdsAlone(sunk.judge(), MotionFault::GroundPenetration, 100, 0.069, 0.));
+  BOOST_TEST((weigh(sunk, 0., 0.) == MotionOutcome::Repairable));
+  sunk.ground.setConstant(0.071);
+  BOOST_TEST((weigh(sunk, 0., 0.) == MotionOutcome::NotFeasible));
 
   // No displacement mends a jump, nor a robot whose normals point down.
   Stand jumping = pulled;

@@ -162,7 +162,7 @@ BOOST_AUTO_TEST_CASE(exact_motions_are_not_filtered_by_default) {
   const DerivedMotion derived = deriveMotion(record.model, record.recorded);
   BOOST_TEST(derived.is_recorded);
   BOOST_TEST(!derived.is_automatic);
-  BOOST_TEST(std::isnan(derived.noise));
+  BOOST_TEST(derived.isExact());
   BOOST_TEST(derived.unsure.size() == 201);
   BOOST_TEST(!derived.unsure.any());
 }
@@ -177,7 +177,15 @@ BOOST_AUTO_TEST_CASE(measured_motions_are_filtered_by_default) {
     const DerivedMotion same = deriveMotion(record.model, record.recorded, derived.cutoff);
     BOOST_TEST(close(same.motion.a, derived.motion.a, 0.));
     BOOST_TEST(!same.is_automatic);
-    BOOST_TEST(std::isnan(same.noise));
+    BOOST_TEST(same.noise == derived.noise);
+    // It is noisy, whether somebody filters it or not.
+    BOOST_TEST(!derived.isExact());
+    BOOST_TEST(!deriveMotion(record.model, record.recorded, 0.).isExact());
+    // And what is exact is so no more once it has been filtered for no reason.
+    const Record exact = makeSine(rate, 2.);
+    BOOST_TEST(deriveMotion(exact.model, exact.recorded).isExact());
+    BOOST_TEST(deriveMotion(exact.model, exact.recorded, 0.).isExact());
+    BOOST_TEST(!deriveMotion(exact.model, exact.recorded, derived.cutoff).isExact());
   }
   // Too few frames to tell are filtered as well.
   const Record few = makeSine(100., 0.05);

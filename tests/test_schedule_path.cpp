@@ -345,6 +345,43 @@ BOOST_AUTO_TEST_CASE(what_ground_carries_and_nobody_lifts_is_active_for_sure) {
   BOOST_TEST(none.probability.maxCoeff() == 0.);
 }
 
+BOOST_AUTO_TEST_CASE(levels_that_are_left_out_of_many_are_none_twice) {
+  // Five feet of three points each have 1024 sets, of which 256 are looked at. All points are at
+  // rest, nothing is needed and changes are for free, so that neither feet nor frames depend on
+  // each other.
+  Random random(5);
+  Problem problem(random, {0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4}, 2);
+  problem.time[1] = 1.;
+  problem.force.setZero();
+  problem.torque.setZero();
+  for (std::size_t k = 0; k < problem.limbs.size(); ++k) {
+    problem.position[k].row(2).setZero();
+    problem.velocity[k].setZero();
+    problem.rests[k] = {{{0, 2, 0., true}}, {0, 0}};
+  }
+  problem.settings.change = 1e-9;
+  problem.settings.rate = 0.1;  // a frame lasts half a second
+  const SchedulePath found = problem.find();
+  const double all = std::exp(0.5 * problem.settings.rate * problem.settings.contact_gain * 2.);
+  for (const Index last : {2, 5, 8, 11, 14}) {  // of a foot, active only if all its points are
+    BOOST_TEST(found.probability(last, 0) < all / (1. + all) + 1e-4);
+    BOOST_TEST(found.probability(last, 0) > 0.3);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(what_is_not_finite_in_a_frame_ends_there) {
+  Random random(6);
+  Problem problem(random, {0, 0, 1, 1}, 40, true);
+  const SchedulePath before = problem.find();
+  for (const double size : {1e30, 1e200, kInfinity, std::nan("")}) {
+    problem.force.col(20).setConstant(size);
+    const SchedulePath found = problem.find();
+    for (const Index frame : {0, 10, 18, 22, 30, 39})
+      BOOST_TEST(found.sets[std::size_t(frame)] == before.sets[std::size_t(frame)]);
+    BOOST_TEST(found.probability.allFinite());
+  }
+}
+
 BOOST_AUTO_TEST_CASE(an_empty_motion_and_a_robot_without_points) {
   Random random(4);
   Problem problem(random, {0, 1}, 4);

@@ -66,15 +66,15 @@ struct DYNACOM_EXPORT DetectionSettings {
   double speed_scale_part = 3., speed_scale_least = 0.01, speed_scale_greatest = 0.2;
   /// Of forces [m g]: this many for each m/s of the scale of speeds, between these.
   double force_scale_part = 0.3, force_scale_least = 0.01, force_scale_greatest = 0.1;
-  /// Of moments, for each unit of the scale of forces: the lever [m].
+  /// Of moments, for each unit of the scale of forces: the lever ℓ [m]. What a set of points cannot
+  /// give is the least ‖force‖² + ‖moment‖²/ℓ².
   double lever = 0.33;
 
   // Costs.
 
-  /// What being in contact is worth, for a second: a point costs as much less.
+  /// What being in contact is worth, each of `rate` times a second: a point costs as much less.
   double contact_gain = 12.;
-  /// By how much the cost of heights and speeds in their own scales exceeds that at most: who is in
-  /// the air never pays for it by this cost alone.
+  /// By how much the cost of heights and speeds in their own scales exceeds that at most.
   double fine_excess = 4.;
   /// The same in absolute scales, [m] and [m/s], with a factor, and the greatest cost.
   double coarse_factor = 3., coarse_height = 0.05, coarse_speed = 0.4, coarse_greatest = 50.;

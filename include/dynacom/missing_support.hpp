@@ -24,7 +24,8 @@ struct MissingSupport {
   /// Largest norms of the residual's force [m g] and moment [m g m] over the frames of intervals
   /// whose accelerations are known (MotionVerdict::unsure).
   double force, torque;
-  double cop_distance;  ///< largest measured MotionFault::CoPOutside in intervals [m]
+  double cop_distance;  ///< largest measured MotionFault::CoPOutside in intervals [m]; infinite
+                        ///< where nothing is known of the centre, as the two above
 };
 
 /// Finds what is missing. Frames count that are beyond the limit of a fault that is about forces:

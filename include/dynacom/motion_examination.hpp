@@ -41,7 +41,7 @@ struct DYNACOM_EXPORT ExaminationSettings {
   void validate() const;
 };
 
-/// What another cut-off frequency would have led to.
+/// What another cut-off frequency would have led to, with the same contacts, ground and links.
 struct CutoffSensitivity {
   double cutoff;  ///< [Hz]
   MotionVerdict verdict;
@@ -61,11 +61,11 @@ struct Seat {
 /// All that was found of a recorded motion, step by step.
 struct MotionExamination {
   DerivedMotion derived;
-  std::vector<ContactMotion> contacts;  ///< computeContactMotions()
+  std::vector<ContactMotion> contacts;  ///< computeContactMotions(); velocities are relative to the
+                                        ///< ground, which may be a treadmill
   /// splitContacts(), with the links that were looked at, if one of them carries.
   std::vector<PartRobot::Part> parts;
-  /// The same as `contacts` for the parts, but that velocities are relative to the ground.
-  std::vector<ContactMotion> part_motions;
+  std::vector<ContactMotion> part_motions;  ///< the same of the parts
   /// inferContacts(): of the parts, within the contacts that are recorded, if there are any.
   ContactInference inference;
   ContactSchedule schedule;  ///< of the contacts, gathered from that of their parts

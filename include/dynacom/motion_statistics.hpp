@@ -38,7 +38,7 @@ struct DYNACOM_EXPORT MotionStatistics {
 
   Eigen::Index frames;
   double mass;    ///< of the robot [kg]
-  double weight;  ///< m g, of standard gravity where there is none [N]
+  double weight;  ///< m g, with the gravity that the robot has, 9.81 m/s² if it has none [N]
   std::map<DistributionStatus, Eigen::Index> statuses;  ///< how many frames have which
   double mean_vertical_force;  ///< of the ground's; 1 for a motion that begins and ends at rest
   /// What part of that ends in momentum, (ċ_z(end) − ċ_z(begin)) / (g duration): a clip may begin

@@ -16,7 +16,8 @@ namespace dynacom {
 /// What may be wrong with a motion. In each frame something is measured; forces are parts of the
 /// robot's weight m g, moments of m g times a metre. What accelerations decide, from ResidualForce
 /// to FlightWithSupportNeeded, is not measured in frames whose accelerations are not known
-/// (MotionVerdict::unsure), nor is FootSliding near jumps: these are 0 there.
+/// (MotionVerdict::unsure), nor is FootSliding near jumps: these are 0 there, and such frames are
+/// no part of those of which a share may be beyond the limit.
 enum class MotionFault {
   /// An active contact's normal, which must point into the robot, points down: how far below the
   /// horizontal [rad], π/2 for straight down. It comes first, since it is the robot's description
@@ -52,7 +53,7 @@ DYNACOM_EXPORT const char* getUnit(MotionFault fault);
 /// What the fault means, such as "the contacts cannot give the force".
 DYNACOM_EXPORT const char* getMeaning(MotionFault fault);
 
-/// Whether a small change of the motion mends the fault: not where it is the robot's description
+/// Whether a small change of the motion can mend the fault: not where it is the robot's description
 /// that is wrong, or frames do not belong together.
 DYNACOM_EXPORT bool isMendable(MotionFault fault);
 
@@ -104,6 +105,10 @@ struct DYNACOM_EXPORT VerdictSettings {
   /// distanceToFeasible(). Well retargeted clips need 0.2 to 4 mm, kicks and sprints up to 10;
   /// three joints mixed up 16, a robot that leans 5 cm too far 50.
   double repairable_distance = 0.01, repairable_largest_distance = 0.05;
+  /// Nor is one whose contacts are deeper below their ground than this, if that is a fault, or slide
+  /// by more than the second in a row of frames that are beyond the limit, > 0 [m]. The toes of
+  /// people who push off seem to be 6 cm deep where they were measured by markers.
+  double repairable_depth = 0.07, repairable_slide = 0.05;
 
   const FaultLimit& operator[](MotionFault fault) const;
   FaultLimit& operator[](MotionFault fault);
@@ -131,7 +136,8 @@ struct MotionFinding {
 };
 
 /// A part of a motion, longer than VerdictSettings::minimal_window, without a frame beyond the
-/// limit of any fault, but for short interruptions. A discontinuity is never one of those.
+/// limit of any fault, but for short interruptions. A discontinuity is never one of those. Frames
+/// that are unsure may be within one, but neither begin nor end it.
 struct MotionWindow {
   Eigen::Index first, last;  ///< frames, both included
   double begin, end;         ///< their times [s]
@@ -165,9 +171,13 @@ struct DYNACOM_EXPORT MotionVerdict {
   std::vector<ContactNormal> normals;  ///< of each contact of the robot
 
   const MotionFinding& operator[](MotionFault fault) const;
-  /// Lets NotFeasible be Repairable, where only mendable faults hold and the distance to feasible
-  /// is known and within what settings allow.
-  void weighDistance(const CentroidalChange& distance, const VerdictSettings& settings);
+  /// Lets NotFeasible be Repairable, where only mendable faults hold, and the distance to feasible
+  /// and what contacts sink and slide are within what settings allow.
+  /// @param distance  of distanceToFeasible(); without it, where it did not converge, nothing
+  /// changes
+  /// @param time      of the frames [s]
+  void weighDistance(const CentroidalChange& distance, const Eigen::VectorXd& time,
+                     const VerdictSettings& settings);
   /// The largest share of frames beyond the limit of a fault that holds; 0 if none does.
   double getSeverity() const;
   bool isFeasible() const { return outcome == MotionOutcome::Feasible; }
@@ -180,7 +190,8 @@ struct DYNACOM_EXPORT MotionVerdict {
 constexpr Eigen::Index kMinimalFrames = 6;
 
 /// Judges a motion. The outcome is Unknown if there are fewer than kMinimalFrames frames and their
-/// derivatives are not those of `recorded`, or if no fault holds but all frames are unsure.
+/// derivatives are not those of `recorded`, or if no fault holds and all frames are unsure but
+/// fewer than kMinimalFrames.
 /// @param contacts  of computeContactMotions() for the same robot and motion
 /// @param recorded  the same before any filter: jumps are looked for in its q, and its v and a say
 ///                  whether the motion's are recorded ones

@@ -14,8 +14,6 @@ namespace dynacom {
 struct DYNACOM_EXPORT RecordedMotion {
   Eigen::VectorXd time;  ///< frames, strictly increasing [s]
   Eigen::MatrixXd q;     ///< configurations with quaternions of norm 1, nq × frames
-  /// | norm − 1 | of the root's quaternions as they were before; frames, or none for zeros.
-  Eigen::VectorXd quaternion_error = {};
   /// Velocities and accelerations, nv × frames each; without columns where they were not recorded.
   Eigen::MatrixXd v = {}, a = {};
   /// When which contact was active, if that was recorded.
@@ -56,7 +54,7 @@ constexpr double kThinnedRate = 100., kRoundedCutoff = 40.;
 constexpr double kUnsureForce = 0.03, kUnsureTorque = 0.01;
 
 /// A motion with derivatives.
-struct DerivedMotion {
+struct DYNACOM_EXPORT DerivedMotion {
   Motion motion;
   bool is_recorded;             ///< whether v and a are those that were recorded
   DerivativeMismatch mismatch;  ///< of those that were recorded; NaN where v or a was not
@@ -66,14 +64,18 @@ struct DerivedMotion {
   double time_error;
   /// Whether the cut-off, or that there is none, was chosen for the noise below.
   bool is_automatic;
-  /// estimateAccelerationNoise() of all frames, and of as many as make about kThinnedRate, which is
-  /// the same where that is not lower; NaN where no cut-off had to be chosen, and of few frames
-  /// [g].
+  /// estimateAccelerationNoise() of all frames as they were recorded, and of as many as make about
+  /// kThinnedRate, which is the same where that is not lower; NaN of few frames [g].
   double noise, thinned_noise;
   /// Whether a frame's accelerations hang on what was before the first frame or after the last one,
   /// which nobody knows: it was filtered, it is within half a period of the cut-off from that end,
   /// and the motion there is not at rest, see kUnsureForce; one per frame.
   Eigen::Array<bool, Eigen::Dynamic, 1> unsure;
+
+  /// Whether the motion is free of noise, see inferContacts(): it is no noisier than kExactNoise,
+  /// and was not filtered, or for rounding only. Motions of too few frames to tell are, if they
+  /// were not filtered.
+  bool isExact() const;
 };
 
 /// The motion that was recorded, if its velocities and accelerations agree with its configurations;

@@ -2,6 +2,7 @@
 """What is to be said of all clips of a batch together."""
 
 import heapq
+import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -86,4 +87,7 @@ def _judged(table: Path, found: Overview, listed: int) -> Iterator[Row]:
 
 
 def _badness(row: Row) -> tuple[int, float, float]:
-    return _VERDICTS.index(row["verdict"]), row["severity"], row["residual_force_rms"]
+    residual = row["residual_force_rms"]
+    if residual is None:  # it is too large for numbers
+        residual = math.inf
+    return _VERDICTS.index(row["verdict"]), row["severity"], residual

@@ -152,8 +152,8 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
             f"<td>{_reasons(row)}</td>"
             + _number(row["severity"], f"{row['severity']:.1%}")
             + _number(row["feasible_share"], f"{row['feasible_share']:.1%}")
-            + _distance(row["distance_rms"])
-            + _distance(row["distance_max"])
+            + _number(_millimetres(row["distance_rms"]))
+            + _number(_millimetres(row["distance_max"]))
             + _number(row["residual_force_rms"])
             + _number(row["residual_torque_rms"])
             + _number(row["mean_vertical_force"])
@@ -181,7 +181,7 @@ def _reasons(row: Row) -> str:
     if row["verdict"] == "unknown":
         return escape(f"too_short: {TOO_SHORT}")
     texts = [
-        f"{code} ({row[f'{code}.frames']} frames, up to {row[f'{code}.worst']:.3g} {unit})"
+        f"{code} ({row[f'{code}.frames']} frames, up to {_worst_text(row, code)} {unit})"
         for code, (unit, _) in FAULTS.items()
         if row[f"{code}.holds"]
     ]
@@ -209,11 +209,18 @@ def _table(titles: Iterable[tuple[str, str]], rows: list[str]) -> str:
     )
 
 
-def _distance(metres: float | None) -> str:
-    return _number(math.nan, "–") if metres is None else _number(1e3 * metres)
+def _worst_text(row: Row, code: str) -> str:
+    worst = row[f"{code}.worst"]
+    return "∞" if worst is None else format(worst, ".3g")
 
 
-def _number(value: float, text: str | None = None) -> str:
+def _millimetres(metres: float | None) -> float | None:
+    return None if metres is None else 1e3 * metres
+
+
+def _number(value: float | None, text: str | None = None) -> str:
+    if value is None:  # it does not exist, or is too large for numbers
+        value, text = math.nan, "–"
     # As JavaScript reads it.
     key = repr(value).replace("inf", "Infinity").replace("nan", "-Infinity")
     return f'<td class="n" data-value="{key}">{text or format(value, ".3g")}</td>'

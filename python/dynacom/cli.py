@@ -230,8 +230,9 @@ class _Request:
         if self.settings is not None:
             options.update_from_file(self.settings)
         options.update_from_texts(self.set_ or [])
+        if self.cutoff is not None:
+            options.update_from_texts([f"cutoff={self.cutoff}"])
         values = {
-            "cutoff": _parse_cutoff(self.cutoff),
             "flat": self.flat,
             "omega": self.omega,
             "distance": self.distance,
@@ -486,13 +487,6 @@ def _parse_shard(text: str) -> tuple[int, int]:
     if not (slash and part.isdecimal() and parts.isdecimal()):
         raise DynacomError(f"shard must be i/n with i from 1 to n, got {text}")
     return int(part), int(parts)
-
-
-def _parse_cutoff(text: str | None) -> float | str | None:
-    try:
-        return text if text is None else float(text)
-    except ValueError:
-        return text  # auto, or what the options refuse
 
 
 @contextmanager

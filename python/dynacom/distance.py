@@ -41,7 +41,7 @@ def distance_text(
         moment: writes a time [s].
     """
     if distance["largest"] == 0.0:
-        return "none: the contacts can give what every frame needs"
+        return "0 mm: the contacts can give what is needed in every frame that is judged"
     text = (
         f"{_millimetres(distance['rms'])} from a feasible motion (RMS; "
         f"{_millimetres(distance['largest'])} at most, at {moment(distance['time'])})"

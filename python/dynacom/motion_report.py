@@ -353,7 +353,7 @@ def examine(
         DynacomError: as there.
     """
     schedule, schedule_text = _find_schedule(clip, robot, schedule)
-    recorded = RecordedMotion(clip.time, clip.q, clip.quaternion_error, clip.v, clip.a, schedule)
+    recorded = RecordedMotion(clip.time, clip.q, clip.v, clip.a, schedule)
     try:
         examination = examiner.examine(recorded)
     except ValueError as error:
@@ -406,6 +406,7 @@ def _summarize(report: MotionReport) -> dict[str, Any]:
         "clip": clip.path.name,
         "robot": robot.name,
         "mass": statistics.mass,
+        "weight": statistics.weight,
         "frames": statistics.frames,
         "duration": float(clip.time[-1] - clip.time[0]),
         "frame_rate": derived.frame_rate,
@@ -501,7 +502,8 @@ def _gravity_texts(robot: Robot) -> Iterator[str]:
     """Where it is not the Earth's."""
     gravity = -robot.model.gravity.linear[2]
     if abs(gravity - STANDARD_GRAVITY) > 0.01:
-        yield f"Gravity is {gravity:g} m/s^2; m g is with {STANDARD_GRAVITY} m/s^2 all the same."
+        text = "is the weight there" if gravity > 0.0 else f"is with {STANDARD_GRAVITY} m/s^2"
+        yield f"Gravity is {gravity:g} m/s^2; m g {text}."
 
 
 def _unjudged_texts(found: MotionExamination) -> Iterator[str]:
@@ -574,6 +576,7 @@ def _residuals(
         "residual_force_rms": statistics.residual_force_rms,
         "residual_torque_rms": statistics.residual_torque_rms,
         "relaxed_share": statistics.share(DistributionStatus.Relaxed),
+        "verdict": found.verdict.outcome,
         "codes": found.verdict.codes,
     }
 

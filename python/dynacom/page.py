@@ -80,7 +80,7 @@ def write_page(
         head=_head(summary),
         verdict=_verdict(summary),
         notes=_notes([*summary["notes"], *([note] if note else [])]),
-        contacts=_contacts(robot, arrays, summary),
+        contacts=_contacts(robot, summary),
         sensitivity=_sensitivity(summary),
         measured=_measured(summary),
         key=_key(robot, summary),
@@ -155,7 +155,7 @@ def _columns(
     robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
     """What page.js plots: name -> a value per frame. The first is `time`."""
-    weight = scene.weight(robot, summary)
+    weight = summary["weight"]
     statuses = _statuses(arrays)
     columns = {
         "time": arrays["time"],
@@ -321,18 +321,17 @@ def _key(robot: Robot, summary: Mapping[str, Any]) -> str:
     return "".join(f"<span>{_dot(color)} {escape(text)}</span>" for text, color in colors.items())
 
 
-def _contacts(robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[str, Any]) -> str:
+def _contacts(robot: Robot, summary: Mapping[str, Any]) -> str:
     rows = []
     for number, name in enumerate(robot.contacts):
         contact = summary["contacts"][name]
-        friction = arrays[f"contact.{name}.cone_usage"]
         rows.append(
             (
                 f"{_dot(scene.contact_color(number))} {escape(name)}",
                 _percent(contact["active_share"]),
                 _percent(contact["weight_share"]),
                 _number(contact["largest_vertical_force"], "m g"),
-                _number(np.max(friction, initial=-np.inf, where=np.isfinite(friction))),
+                _number(contact["largest_cone_usage"]),
                 _number(summary["ground"].get(name), "m"),
             )
         )
@@ -352,7 +351,7 @@ def _contacts(robot: Robot, arrays: Mapping[str, np.ndarray], summary: Mapping[s
         "Active",
         "Share of weight",
         "Largest vertical force",
-        "Largest friction usage",
+        "Largest use of the friction cone",
         "Ground at",
     )
     return f"<section><h2>Contacts</h2>{_table(titles, rows)}</section>"
@@ -365,13 +364,20 @@ def _sensitivity(summary: Mapping[str, Any]) -> str:
     rows = [
         (
             _number(entry["cutoff"], "Hz") + (" *" if entry["cutoff"] == summary["cutoff"] else ""),
+            escape(entry["verdict"]),
             _number(entry["residual_force_rms"], "m g"),
             _number(entry["residual_torque_rms"], "m g·m"),
             _percent(entry["relaxed_share"]),
         )
         for entry in entries
     ]
-    titles = ("Cut-off", "Residual force, RMS", "Residual moment, RMS", "Frames out of reach")
+    titles = (
+        "Cut-off",
+        "Verdict",
+        "Residual force, RMS",
+        "Residual moment, RMS",
+        "Frames out of reach",
+    )
     return (
         "<section><h2>How it depends on the filter</h2>"
         f"{_table(titles, rows)}<p class='caption'>* used for this report</p></section>"

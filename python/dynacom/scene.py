@@ -42,11 +42,6 @@ def contact_color(number: int) -> tuple[int, int, int]:
     return CONTACT_COLORS[number % len(CONTACT_COLORS)]
 
 
-def weight(robot: Robot, summary: Mapping[str, Any]) -> float:
-    """m g [N]; 1 where that is zero, and forces are, too."""
-    return summary["mass"] * float(np.linalg.norm(robot.model.gravity.linear)) or 1.0
-
-
 def surface_corners(
     settings: ContactSettings, arrays: Mapping[str, np.ndarray], name: str
 ) -> np.ndarray:
@@ -210,7 +205,7 @@ class Scene:
         )
         #: What lengths are measured by: the height of the CoM.
         self._height = max(float(np.nanmedian(arrays["com"][:, 2])) - self._ground, 0.1)
-        self._length_per_newton = self._height / weight(robot, summary)
+        self._length_per_newton = self._height / (summary["weight"] or 1.0)
         self._offset = _centre(arrays["time"], arrays["com"][:, :2], self._height)
         self._corners = [
             surface_corners(settings, arrays, name) for name, settings in robot.contacts.items()

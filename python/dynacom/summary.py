@@ -48,22 +48,22 @@ def summary_table(summary: dict[str, Any]) -> Table:
         table.add_row(f"  {status}", f"{count} ({count / summary['frames']:.1%})")
     table.add_row("Mass", f"{summary['mass']:.3f} kg")
     mean, change = summary["mean_vertical_force"], summary["momentum_change"]
-    text = f"{mean:.1%} of the weight"
-    if abs(change) >= 0.0005:
+    text = f"{_percent(mean)} of the weight"
+    if change is not None and abs(change) >= 0.0005:
         text += f", of which {change:+.1%} ends in momentum"
     table.add_row("Mean vertical force", text)
     for entry in summary["cutoff_sensitivity"]:
         table.add_row(
             f"Residual at {entry['cutoff']:g} Hz",
-            f"{entry['residual_force_rms']:.3g} m g, "
-            f"{entry['residual_torque_rms']:.3g} m g m (RMS)",
+            f"{_number(entry['residual_force_rms'])} m g, "
+            f"{_number(entry['residual_torque_rms'])} m g m (RMS): {entry['verdict']}",
         )
     table.add_section()
     for name, contact in summary["contacts"].items():
-        text = f"{contact['weight_share']:.1%}"
+        text = _percent(contact["weight_share"])
         if contact["active_share"] > 0.0:
             text += (
-                f" ({contact['weight_share_while_active']:.1%} while active, in "
+                f" ({_percent(contact['weight_share_while_active'])} while active, in "
                 f"{contact['active_share']:.1%} of the frames)"
             )
         else:
@@ -72,13 +72,24 @@ def summary_table(summary: dict[str, Any]) -> Table:
     for name, compared in summary["measured"].items():
         table.add_row(
             escape(f"Measured on {name}"),
-            f"f_z differs by {compared['bias'][2]:.3g} N, {compared['rms'][2]:.3g} N RMS",
+            f"f_z differs by {_number(compared['bias'][2])} N, {_number(compared['rms'][2])} N RMS",
         )
     if summary["notes"]:
         table.add_section()
         for note in summary["notes"]:
             table.add_row("Note", escape(note))
     return table
+
+
+def _percent(value: float | None) -> str:
+    """A share; a dash for one that does not exist, or is too large for numbers."""
+    if value is None:
+        return "–"
+    return f"{value:.1%}" if abs(value) < 1e3 else f"{100 * value:.3g}%"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}"
 
 
 def _windows_text(summary: dict[str, Any], listed: int = 8) -> str:

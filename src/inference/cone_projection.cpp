@@ -14,7 +14,8 @@ namespace {
 // An edge whose slope along the residual is less than this part of the wrench brings nothing: costs
 // are told apart by hundredths of the weight.
 constexpr double kGain = 1e-6;
-// A direction whose part outside the span of the others is smaller than this is taken to be within.
+// A direction is taken to be within the span of the others if the square of its part outside is
+// smaller than this.
 constexpr double kDependent = 1e-10;
 // Each round adds an edge, and the distance decreases; there are few rounds in practice.
 constexpr int kRounds = 60;

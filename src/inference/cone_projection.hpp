@@ -29,12 +29,12 @@ class ConeProjection {
   /// @param lever  ℓ: closest is what has the least ‖force‖² + ‖moment‖²/ℓ² [m]
   explicit ConeProjection(double lever) : lever_(lever) {}
 
+  /// The edges that made up the last answer are tried first: consecutive frames have much in
+  /// common.
   /// @param wrench    (force, moment) about some point
   /// @param levers    from that point to the points that may push
   /// @param mu        of each
   /// @param set       a bit for each point that pushes, of which there are at most kMaximalPoints
-  /// The edges that made up the last answer are tried first: consecutive frames have much in
-  /// common.
   Residual project(const Vector6& wrench, const Eigen::Matrix3Xd& levers,
                    const std::vector<double>& mu, std::uint32_t set);
 

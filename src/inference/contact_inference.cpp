@@ -66,24 +66,16 @@ internal::KnownContacts findKnown(const internal::ContactSplit& parts,
                                   const ContactSchedule& recorded, Index frames) {
   recorded.validate(frames);
   internal::KnownContacts known;
-  std::vector<std::string> names;
-  for (std::size_t k = 0; k < parts.parts.size(); ++k) {
-    const std::size_t contact = parts.parts[k].contact;
-    if (contact >= parts.countContacts()) continue;  // nobody records what links do
-    if (contact >= known.masks.size()) {
-      known.masks.resize(contact + 1, 0);
-      names.resize(contact + 1);
-    }
-    known.masks[contact] |= 1u << k;
-    names[contact] = parts.parts[k].name;
+  const std::vector<std::string> names = parts.nameContacts();
+  known.masks.resize(names.size(), 0);
+  for (std::size_t k = 0; k < parts.parts.size(); ++k)
+    if (parts.parts[k].contact < names.size())  // nobody records what links do
+      known.masks[parts.parts[k].contact] |= 1u << k;
+  known.active.setConstant(Index(names.size()), frames, false);
+  for (std::size_t row = 0; row < recorded.names.size(); ++row) {
+    const auto own = std::find(names.begin(), names.end(), recorded.names[row]);
+    if (own != names.end()) known.active.row(own - names.begin()) = recorded.active.row(Index(row));
   }
-  known.active.setConstant(Index(known.masks.size()), frames, false);
-  for (std::size_t row = 0; row < recorded.names.size(); ++row)
-    for (std::size_t k = 0; k < names.size(); ++k) {
-      const std::string& name = recorded.names[row];
-      if (names[k] == name || names[k].rfind(name + ".", 0) == 0)
-        known.active.row(Index(k)) = recorded.active.row(Index(row));
-    }
   return known;
 }
 
@@ -184,13 +176,13 @@ ContactInference internal::inferContacts(const ContactSplit& parts,
     for (std::size_t k = 0; k < count; ++k) addTrack(k, velocities[k]);
   }
 
-  const std::vector<internal::Rests> rests = internal::findRests(tracks, time, exact, settings);
-  const internal::CostScales scales = internal::findScales(tracks, rests, time, settings);
-  const internal::WrenchTrack wrench{dynamics.com, dynamics.ground_force, dynamics.ground_torque};
-  const double gravity = -parts.carrier.gravity.z();
-  const double weight = parts.carrier.mass * (gravity > 0. ? gravity : internal::kStandardGravity);
   internal::KnownContacts known;
   if (recorded) known = findKnown(parts, *recorded, frames);
+  const std::vector<internal::Rests> rests =
+      internal::findRests(tracks, time, exact, settings, recorded ? &known : nullptr);
+  const internal::CostScales scales = internal::findScales(tracks, rests, time, settings);
+  const internal::WrenchTrack wrench{dynamics.com, dynamics.ground_force, dynamics.ground_torque};
+  const double weight = parts.carrier.mass * internal::findUnitGravity(parts.carrier.gravity);
   const internal::SchedulePath path = internal::findSchedulePath(
       tracks, rests, scales, wrench, weight, time, settings, recorded ? &known : nullptr);
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "../check.hpp"
+#include "../settings_fields.hpp"
 
 namespace dynacom {
 
@@ -78,12 +79,7 @@ const std::vector<DetectionSettings::Constant>& DetectionSettings::constants() {
 }
 
 void DetectionSettings::validate() const {
-  for (const auto& [name, field] : constants()) {
-    const double value = this->*field;
-    internal::requireField(std::isfinite(value) && value > 0.,
-                           ("DetectionSettings." + std::string(name)).c_str(), "finite and > 0",
-                           value);
-  }
+  internal::requirePositive("DetectionSettings", *this, constants());
   for (const auto& [least, greatest] : kBounds)
     internal::requireField(this->*greatest >= this->*least,
                            ("DetectionSettings." + std::string(nameOf(greatest))).c_str(),
@@ -103,8 +99,7 @@ void DetectionSettings::validate() const {
 std::string DetectionSettings::to_string() const { return internal::concat(*this); }
 
 bool DetectionSettings::operator==(const DetectionSettings& other) const {
-  for (const Constant& field : constants())
-    if (this->*field.second != other.*field.second) return false;
+  if (!internal::areEqual(*this, other, constants())) return false;
   const auto same = [](double one, double two) {
     return one == two || (std::isnan(one) && std::isnan(two));
   };
@@ -115,9 +110,8 @@ bool DetectionSettings::operator==(const DetectionSettings& other) const {
 
 std::ostream& operator<<(std::ostream& out, const DetectionSettings& settings) {
   out << "DetectionSettings(";
-  for (const auto& [name, field] : DetectionSettings::constants())
-    out << name << "=" << settings.*field << ", ";
-  return out << "ground_height=" << settings.ground_height << ", ground_velocity=("
+  internal::write(out, settings, DetectionSettings::constants());
+  return out << ", ground_height=" << settings.ground_height << ", ground_velocity=("
              << settings.ground_velocity.x() << ", " << settings.ground_velocity.y() << ", "
              << settings.ground_velocity.z() << "))";
 }

@@ -21,7 +21,7 @@ using Mask = std::uint32_t;
 // How many sets there may be in a frame. More are made fewer, see FrameSets.
 constexpr std::size_t kMaximalSets = 256;
 // A change of contact is as probable as its cost says in so long a time [s], in a longer one, too,
-// and in a shorter one the less. What the path pays for it hangs on no time.
+// and in a shorter one the less. The path pays the same for it at any frame rate.
 constexpr double kChangeTime = 1. / 60.;
 // What costs no more than this in kChangeTime is not worth looking for: a hundredth of a change.
 constexpr float kNegligible = 0.05f;
@@ -29,6 +29,11 @@ constexpr float kNegligible = 0.05f;
 constexpr float kProbable = 0.005f;
 // Costs that are larger by this make a set improbable.
 constexpr float kImprobable = 6.f;
+// How many frames are looked at together at most, and how many of these are looked at again with
+// the next ones.
+constexpr Index kLongest = 8000, kOverlap = 1000;
+// The most that what a set is missing costs: next to what is infinite, nothing else would count.
+constexpr float kLargestCost = 1e5f;
 
 // So many points of a limb, with what it costs that they are active where they are.
 struct Level {
@@ -164,8 +169,10 @@ class PathFinder {
       }
       Index behind = first;
       while (behind < frames && !certain[static_cast<std::size_t>(behind)]) ++behind;
+      // A frame does not depend on others that are far away: what is long is taken bit by bit.
+      for (; behind - first > kLongest + kOverlap; first += kLongest)
+        findBetween(first, first + kLongest + kOverlap);
       findBetween(first, behind);
-      for (Index frame = first; frame < behind; ++frame) forget(frame);
       first = behind - 1;
     }
     return std::move(found_);
@@ -307,7 +314,11 @@ void PathFinder::makeLevels(Index frame, Levels& levels) {
     auto most = std::max_element(levels.begin(), levels.end(),
                                  [](const auto& a, const auto& b) { return a.size() < b.size(); });
     if (most->size() > 3) {
-      *most = std::vector<Level>{most->front(), cheapest(*most), most->back()};
+      std::vector<Level> fewer = {most->front()};
+      const Level best = cheapest(*most);
+      if (best.mask != most->back().mask) fewer.push_back(best);
+      fewer.push_back(most->back());
+      *most = std::move(fewer);
     } else {
       const auto value = [&](const std::vector<Level>& limb) {
         return limb.size() < 2 ? -std::numeric_limits<float>::infinity() : cheapest(limb).cost;
@@ -370,8 +381,10 @@ float PathFinder::costOf(const Eigen::Vector2d& missing, Index frame) const {
   const double fine = missing[0] / scales_.force + missing[1] / scales_.torque;
   const double coarse =
       missing[0] / settings_.missing_force + missing[1] / settings_.missing_torque;
-  return float(settings_.rate * duration(frame) * settings_.dynamics_weight *
-               (std::min(fine, settings_.missing_greatest) + settings_.missing_factor * coarse));
+  const double cost =
+      settings_.rate * duration(frame) * settings_.dynamics_weight *
+      (std::min(fine, settings_.missing_greatest) + settings_.missing_factor * coarse);
+  return cost < double(kLargestCost) ? float(cost) : kLargestCost;
 }
 
 // The least cost of what a subset is missing, whose norm, of force and moment together, is no less.
@@ -404,7 +417,7 @@ Choice PathFinder::choose(Index frame) {
   }
   found_.missing.col(frame) = findMissing(frame, choice.set);
   float excess = costOf(found_.missing.col(frame), frame);
-  if (!std::isfinite(excess)) return {choice.set, 0.f, 0.f};
+  if (excess == kLargestCost) return {choice.set, 0.f, 0.f};
   if (excess > negligible(frame) && all != choice.set)
     excess -= leastCostOf(findMissing(frame, all), frame);
   // A subset of all points may trade force for moment, and so cost less than all of them, which can
@@ -539,6 +552,7 @@ void PathFinder::findBetween(Index first, Index behind) {
   });
 
   while (findProbability(from, to)) continue;
+  for (Index frame = first; frame < behind; ++frame) forget(frame);
 }
 
 void PathFinder::findChanges(const FrameSets& before, Index frame, FrameSets& sets) const {

@@ -15,12 +15,6 @@ struct WrenchTrack {
   Eigen::Ref<const Eigen::Matrix3Xd> force, torque;  ///< about c [N], [N·m]
 };
 
-/// What is known of contacts: of each, whether one or more of its points are active, or none.
-struct KnownContacts {
-  std::vector<std::uint32_t> masks;  ///< a bit for each point of a contact
-  Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic> active;  ///< contacts × frames
-};
-
 /// The cheapest schedule of points, and how sure it is.
 struct SchedulePath {
   std::vector<std::uint32_t> sets;  ///< in each frame a bit for each point that is active

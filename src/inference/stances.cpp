@@ -174,6 +174,28 @@ constexpr double kLow = 0.03, kLowest = 0.05;
 // The ground moves if its velocity is this many times as frequent as rest, in a part of the frames.
 constexpr double kMoreFrequent = 3., kFrequent = 0.1;
 
+// Puts on the ground where points rest while their contact is known to be active, if they are about
+// as low as its lowest one.
+void standWhereKnown(const std::vector<PointTrack>& points, const KnownContacts& known,
+                     double same_ground, std::vector<Rests>& all) {
+  for (std::size_t contact = 0; contact < known.masks.size(); ++contact) {
+    const auto active = known.active.row(Index(contact));
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      if (!(known.masks[contact] >> k & 1u)) continue;
+      for (Rest& rest : all[k].list) {
+        const Index size = rest.behind - rest.first;
+        if (!active.segment(rest.first, size).any()) continue;
+        double lowest = std::numeric_limits<double>::infinity();
+        for (std::size_t other = 0; other < points.size(); ++other)
+          if (known.masks[contact] >> other & 1u)
+            lowest =
+                std::min(lowest, points[other].position.row(2).segment(rest.first, size).mean());
+        if (rest.height <= lowest + same_ground) rest.on_ground = true;
+      }
+    }
+  }
+}
+
 }  // namespace
 
 Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
@@ -219,7 +241,8 @@ Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
 }
 
 std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen::VectorXd& time,
-                             bool exact, const DetectionSettings& settings) {
+                             bool exact, const DetectionSettings& settings,
+                             const KnownContacts* known) {
   // Where exact motions stand, nothing stirs, and all heights are the same.
   const Frames counts =
       exact ? Frames::Constant(time.size(), true) : findCounting(points, time, settings);
@@ -240,12 +263,15 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
     mergeRests(point, counts, speed, settings.same_rest_speed * slow, settings.same_rest, rests);
     all[k].owner = findOwners(rests, speed);
   }
+  const double same_contact = exact ? settings.exact_same_ground : settings.same_ground;
+  if (known) standWhereKnown(points, *known, same_contact, all);
 
   if (!std::isnan(settings.ground_height)) {
     for (Rests& rests : all)
       for (Rest& rest : rests.list) {
-        rest.on_ground = rest.height <= settings.ground_height + settings.same_ground;
-        if (rest.on_ground) rest.height = settings.ground_height;
+        const bool is_low = rest.height <= settings.ground_height + settings.same_ground;
+        if (is_low) rest.height = settings.ground_height;
+        rest.on_ground = rest.on_ground || is_low;
       }
     return all;
   }
@@ -267,7 +293,6 @@ std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen:
   // Links are pressed into the ground, too, and geometry is not exact.
   if (lowest_contact - lowest <= settings.body_ground) levels.push_back(lowest_contact);
   std::sort(levels.begin(), levels.end());
-  const double same_contact = exact ? settings.exact_same_ground : settings.same_ground;
   for (std::size_t k = 0; k < points.size(); ++k) {
     const double same = points[k].is_body ? settings.body_ground : same_contact;
     for (Rest& rest : all[k].list) {

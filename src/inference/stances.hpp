@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "dynacom/detection_settings.hpp"
@@ -23,6 +24,12 @@ struct Rests {
   std::vector<int> owner;  ///< for each frame an index of the list; −1 where there is none
 };
 
+/// What is known of contacts: of each, whether one or more of its points are active, or none.
+struct KnownContacts {
+  std::vector<std::uint32_t> masks;  ///< a bit for each point of a contact
+  Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic> active;  ///< contacts × frames
+};
+
 /// The scales of a motion's costs.
 struct CostScales {
   double height;  ///< [m]
@@ -33,8 +40,11 @@ struct CostScales {
 
 /// Where points are at rest.
 /// @param exact  whether the motion is free of noise
+/// @param known  null where nothing is: what is active stands on the ground with its lowest points,
+///               wherever that is
 std::vector<Rests> findRests(const std::vector<PointTrack>& points, const Eigen::VectorXd& time,
-                             bool exact, const DetectionSettings& settings);
+                             bool exact, const DetectionSettings& settings,
+                             const KnownContacts* known = nullptr);
 
 /// The velocity of the ground [m/s]: the one that low points have that move level, where that is
 /// far more frequent than rest; else zero.

@@ -8,6 +8,7 @@
 
 #include "../check.hpp"
 #include "../motion_check.hpp"
+#include "../settings_fields.hpp"
 #include "../standard_gravity.hpp"
 #include "centroidal_window.hpp"
 #include "dynacom/contact_point.hpp"
@@ -32,27 +33,18 @@ const std::vector<CentroidalFilterSettings::Field>& CentroidalFilterSettings::fi
 }
 
 void CentroidalFilterSettings::validate() const {
-  for (const auto& [name, field] : fields())
-    internal::requireField(std::isfinite(this->*field) && this->*field > 0.,
-                           internal::concat("CentroidalFilterSettings.", name).c_str(),
-                           "finite and > 0", this->*field);
+  internal::requirePositive("CentroidalFilterSettings", *this, fields());
 }
 
 std::string CentroidalFilterSettings::to_string() const { return internal::concat(*this); }
 
 bool CentroidalFilterSettings::operator==(const CentroidalFilterSettings& other) const {
-  return std::all_of(fields().begin(), fields().end(), [&](const Field& field) {
-    return this->*field.second == other.*field.second;
-  });
+  return internal::areEqual(*this, other, fields());
 }
 
 std::ostream& operator<<(std::ostream& out, const CentroidalFilterSettings& settings) {
   out << "CentroidalFilterSettings(";
-  const char* separator = "";
-  for (const auto& [name, field] : CentroidalFilterSettings::fields()) {
-    out << separator << name << "=" << settings.*field;
-    separator = ", ";
-  }
+  internal::write(out, settings, CentroidalFilterSettings::fields());
   return out << ")";
 }
 
@@ -115,7 +107,8 @@ CentroidalProblem describe(const internal::ContactSplit& parts,
   problem.com = dynamics.com;
   problem.wrench.resize(6, frames);
   problem.wrench << dynamics.ground_force, dynamics.ground_torque;
-  problem.wrench /= parts.carrier.mass * internal::kStandardGravity;
+  problem.gravity = internal::findUnitGravity(parts.carrier.gravity);
+  problem.wrench /= parts.carrier.mass * problem.gravity;
   for (std::size_t k = 0; k < motions.size(); ++k) {
     const auto* point = dynamic_cast<const ContactPoint*>(parts.carrier.contacts[k].contact.get());
     if (!point) internal::throwInvalid("part '", parts.parts[k].name, "' must be a ContactPoint");
@@ -191,7 +184,7 @@ CentroidalChange internal::distanceToFeasible(const ContactSplit& parts,
   requireFitting(parts, motions, dynamics, schedule, free);
   const CentroidalProblem problem = describe(parts, motions, dynamics, schedule, free);
   const Index frames = problem.time.size();
-  const double weight = parts.carrier.mass * kStandardGravity;
+  const double weight = parts.carrier.mass * problem.gravity;
   CentroidalChange found;
   found.com.setZero(3, frames);
   found.angular_momentum.setZero(3, frames);

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <pinocchio/spatial.hpp>
 
-#include "../standard_gravity.hpp"
-
 namespace dynacom::internal {
 
 using Eigen::Index;
@@ -36,7 +34,7 @@ CentroidalWindow::CentroidalWindow(const CentroidalProblem& problem,
     : problem_(problem),
       settings_(settings),
       of_displacement_(1. / square(settings.com)),
-      of_acceleration_(square(kStandardGravity / settings.com_acceleration)),
+      of_acceleration_(square(problem.gravity / settings.com_acceleration)),
       of_momentum_(1. / square(settings.angular_momentum)),
       projection_(kLever),
       levers_(3, Index(problem.points.size())) {}
@@ -93,8 +91,8 @@ void CentroidalWindow::discretize() {
     const double before = stepFrom(std::max<Index>(k - 1, 0));
     const double after = stepFrom(std::min(k, frames_ - 2));
     const double duration = 0.5 * (before + after);
-    const double to_before = k > 0 ? 1. / (before * duration * kStandardGravity) : 0.;
-    const double to_after = isLast(k) ? 0. : 1. / (after * duration * kStandardGravity);
+    const double to_before = k > 0 ? 1. / (before * duration * problem_.gravity) : 0.;
+    const double to_after = isLast(k) ? 0. : 1. / (after * duration * problem_.gravity);
     const bool is_open = (k == 0 || isLast(k)) && isFlight(k);
     differences_[at(k)] = {
         to_before, -to_before - to_after,           to_after,

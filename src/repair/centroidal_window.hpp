@@ -13,6 +13,7 @@ namespace dynacom::internal {
 
 /// What distanceToFeasible() asks, without a robot: wrenches are parts of its weight.
 struct CentroidalProblem {
+  double gravity;  // g of m g [m/s²]
   Eigen::VectorXd time;
   Eigen::Matrix3Xd com;
   Eigen::Matrix<double, 6, Eigen::Dynamic> wrench;  // about the CoM [m g, m g·m]

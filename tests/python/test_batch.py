@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-2-Clause
 import contextlib
 import hashlib
+import io
 import os
 import pickle
 import pty
@@ -16,6 +17,7 @@ import numpy as np
 import pyarrow.dataset
 import pyarrow.parquet
 import pytest
+from rich.console import Console
 
 import dynacom
 from batch_clips import cut, hover, motion, same, write_clips, write_program
@@ -25,6 +27,7 @@ from dynacom.batch_pool import Task
 from dynacom.batch_row import Job, error_row
 from dynacom.batch_store import Store
 from dynacom.motion_report import FAULTS
+from dynacom.summary import summary_table
 from helpers import WALKS
 
 ROBOT = "anymal_c"
@@ -66,6 +69,29 @@ def refused(part, *arguments, **options):
 
 
 # The table.
+
+
+def test_numbers_too_large_end_no_batch(walks, tmp_path):
+    """Root mean squares do not exist then; pages and lists do, and a clip's own summary."""
+    with np.load(WALKS / "anymal_walk.npz") as file:
+        q = file["q"][:60].copy()
+    q[30, 9] = 1e200
+    for number in range(2):  # which are alike, and so have to be sorted
+        cut(walks / f"huge_{number}.npz", 0, 60, q=q, v=None, a=None)
+    out = tmp_path / "out"
+    table = rows(dynacom.batch(walks, ROBOT, out=out, jobs=1))
+    path = walks / "huge_0.npz"
+    row = table[str(path)]
+    assert row["status"] == "ok"
+    assert row["verdict"] == "not feasible"
+    assert row["residual_force_rms"] is None
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "huge_0.npz" in page
+    assert "discontinuity (3 frames, up to ∞ of the greatest speed)" in page
+    console = Console(file=io.StringIO(), width=200)
+    console.print(summary_table(dynacom.analyze(path, ROBOT).summary))
+    assert "– of the weight" in console.file.getvalue()
+    assert max(map(len, console.file.getvalue().split())) < 60
 
 
 def test_a_row_for_each_file_whatever_it_is(clips, result):

@@ -82,6 +82,20 @@ def test_leaning(cases):
     assert np.abs(moved[:, 1:]).max() < 0.005
 
 
+def test_leaning_on_the_moon(cases):
+    """Who falls here falls there, only slower."""
+    moon = dynacom.load_robot("talos").with_gravity(1.62)
+    report = judge(cases / "lean_05cm.npz", moon)
+    assert verdict(report) == ("not feasible", ["cop_outside"])
+    assert report.summary["weight"] == pytest.approx(1.62 * report.summary["mass"])
+    assert 45.0 < millimetres(report) < 60.0
+    assert note(report, "m g is the weight there")
+    # Without gravity, nothing leans.
+    nowhere = judge(cases / "lean_05cm.npz", dynacom.load_robot("talos").with_gravity(0.0))
+    assert nowhere.summary["verdict"] == "feasible"
+    assert nowhere.summary["weight"] == pytest.approx(9.81 * report.summary["mass"])
+
+
 def test_on_the_edges_of_tilted_soles(cases):
     """The heels are 10 cm up and the CoM 15 cm behind the front edges, which alone carry."""
     report = judge(cases / "tiptoe30_heel.npz")

@@ -111,6 +111,8 @@ def test_a_treadmill(puppet, velocity):
         assert_allclose(report.summary["ground_velocity"], belt, rtol=0, atol=0.01)
         assert report.summary["verdict"] == "feasible"
         assert "a treadmill" in notes(report)
+        speed = report["contact.left.speed"][active(report)["left"]]  # as the belt sees it
+        assert np.median(speed) < 0.02
     assert "treadmill" not in notes(judge(puppet, play))
 
 
@@ -203,6 +205,35 @@ def test_a_foot_held_still_in_the_air_never_carries(puppet, lift):
     assert report.summary["verdict"] == "feasible"
 
 
+def test_a_box_that_a_schedule_tells_of(puppet):
+    """The foot that is held 5 cm up carries, and stands there."""
+    play = stand(lifted=(-NEVER, NEVER), lift=0.05)
+    schedule = ContactSchedule(list(FEET), np.ones((len(play.time), 2), dtype=bool))
+    report = judge(puppet, play, schedule=schedule)
+    assert active(report)["right"].all()
+    assert report.summary["verdict"] == "feasible"
+    assert report.summary["ground"] == {"left": 0.0, "right": pytest.approx(0.05)}
+    assert "rest" not in notes(report)
+    assert not report.examination.terrain.held
+
+
+def test_names_that_begin_alike(tmp_path):
+    """A schedule is that of the contact that it names."""
+    folder = tmp_path
+    make_puppet(folder)
+    text = (folder / "puppet.yaml").read_text()
+    text = text.replace("name: left", "name: sole.left").replace("name: right", "name: sole")
+    (folder / "puppet.yaml").write_text(text)
+    robot = dynacom.load_robot(folder / "puppet.yaml")
+    play = stand(lifted=(-NEVER, NEVER))
+    for row, name in enumerate(robot.contacts):
+        masks = np.zeros((len(play.time), 2), dtype=bool)
+        masks[:, row] = True
+        report = judge(robot, play, schedule=ContactSchedule(list(robot.contacts), masks))
+        for other, found in active(report).items():
+            assert found.all() == found.any() == (other == name)
+
+
 @pytest.mark.parametrize("lift", [0.03, 0.1])
 def test_a_foot_that_is_lifted_for_a_while(puppet, lift):
     """It leaves and comes back; while it is held in the air it carries nothing."""
@@ -281,10 +312,12 @@ def test_a_height_that_is_given(puppet):
     report = judge(puppet, walk(), options=options)
     assert report.summary["ground"] == {"left": 0.0, "right": 0.0}
     assert report.summary["verdict"] == "feasible"
-    options.detection.ground_height = -0.3
+    options.detection.ground_height = -0.05
     report = judge(puppet, walk(), options=options)
-    heights = report["contact.left.height"]
-    assert_allclose(heights.min(), 0.3, rtol=0, atol=1e-9)
+    assert_allclose(report["contact.left.height"].min(), 0.05, rtol=0, atol=1e-9)
+    for name in FEET:
+        assert not report[f"contact.{name}.active"].any()
+    assert report.summary["verdict"] == "not feasible"
 
 
 # Parts.

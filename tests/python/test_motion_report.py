@@ -172,7 +172,7 @@ def test_arrays_are_those_of_the_steps_by_hand(talos, walk, flat):
         else:
             assert_array_equal(report[name], values, name)
     assert report.summary["omega"] == 3.1
-    recorded = dynacom.RecordedMotion(walk.time, walk.q, walk.quaternion_error)
+    recorded = dynacom.RecordedMotion(walk.time, walk.q)
     verdict = dynacom.judgeMotion(split.robot, motion, recorded, corners, inference.ground, parts)
     assert repr(report.verdict.findings) == repr(verdict.findings)
 

@@ -58,10 +58,13 @@ NUMBERS = {
     "interruption": 0.1,
     "repairable_distance": 0.01,
     "repairable_largest_distance": 0.05,
+    "repairable_depth": 0.07,
+    "repairable_slide": 0.05,
 }
 POSITIVE = (
     *("linear_speed", "turning_speed", "joint_speed"),
     *("repairable_distance", "repairable_largest_distance"),
+    *("repairable_depth", "repairable_slide"),
 )
 FRAMES, MASS, G = 100, 10.0, 9.81
 SOLES = ["left", "right"]
@@ -449,7 +452,7 @@ def test_too_short(stand, frames):
     assert verdict.codes == ["feasible" if is_known else "too_short"]
     assert all(finding.measured.shape == (frames,) for finding in verdict.findings.values())
     arguments = stand.arguments()
-    arguments["recorded"] = RecordedMotion(stand.time, stand.recorded, None, stand.v, stand.a)
+    arguments["recorded"] = RecordedMotion(stand.time, stand.recorded, stand.v, stand.a)
     assert judgeMotion(**arguments).feasible
 
 

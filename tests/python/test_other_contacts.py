@@ -4,6 +4,7 @@
 import copy
 import pickle
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -232,6 +233,15 @@ def test_kneels_and_gets_up(robot):
     assert {"body.left_shank.active", "body.left_shank.position_z"} <= columns.keys()
 
 
+def test_for_how_long_it_stood_before_does_not_matter(robot):
+    """As links do that carry for half a second, in a minute."""
+    frames = _kneel(robot)[0]
+    standing = np.repeat(frames[:1], round(60 * RATE), axis=0)
+    report = dynacom.analyze(_clip(robot, np.concatenate([standing, frames])), robot)
+    assert set(report.summary["bodies"]) == {"left_shank", "right_shank"}
+    assert report.summary["verdict"] == "feasible", report.summary["reasons"]
+
+
 def test_feet_only(robot):
     options = AnalysisOptions(feet_only=True)
     report = dynacom.analyze(_clip(robot, _kneel(robot)[0]), robot, options=options)
@@ -323,6 +333,15 @@ def test_sits(robot):
     )
     assert not any("load" in note for note in notes)
     assert not any(name.startswith("body.") for name in report.columns())
+
+
+def test_a_seat_at_few_frames_a_second(robot):
+    """No two of which are as close as what a short interruption lasts."""
+    step = round(RATE / 4)
+    clip = _clip(robot, _sit(robot)[::step])
+    clip = replace(clip, time=clip.time * step)
+    (seat,) = dynacom.analyze(clip, robot).summary["seats"]
+    assert seat["link"] == "trunk"
 
 
 def test_a_seat_that_is_told_of(robot):

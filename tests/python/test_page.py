@@ -288,7 +288,7 @@ def test_feasible_walk(talos, tmp_path, monkeypatch):
     for title in (
         *("How it depends on the filter", "Computed against the file's forces"),
         *(
-            '<p class="caption distance">Distance: none: the contacts',
+            '<p class="caption distance">Distance: 0 mm: the contacts',
             "feasible CoM",
             '<figure class="">',
         ),

@@ -34,15 +34,13 @@ def fall(model) -> dict[str, np.ndarray]:
 
 def test_what_was_recorded_comes_back(fall):
     schedule = ContactSchedule(["foot"], np.zeros((FRAMES, 1), dtype=bool))
-    error = np.linspace(0.0, 1e-3, FRAMES)
-    recorded = RecordedMotion(TIME, **fall, quaternion_error=error, schedule=schedule)
+    recorded = RecordedMotion(TIME, **fall, schedule=schedule)
     for name, values in fall.items():
         assert_array_equal(getattr(recorded, name), values)
     assert_array_equal(recorded.time, TIME)
-    assert_array_equal(recorded.quaternion_error, error)
     assert recorded.schedule.names == ["foot"]
     bare = RecordedMotion(TIME, fall["q"])
-    for name in ("v", "a", "quaternion_error", "schedule"):
+    for name in ("v", "a", "schedule"):
         assert getattr(bare, name) is None
 
 
