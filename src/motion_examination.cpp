@@ -463,7 +463,7 @@ class MotionExaminer::Workspace::Pipeline {
                                                 const SweptMotion& swept,
                                                 MotionVerdict& verdict) const {
     const MotionAnalysis& needed = swept.analysis;
-    if (!settings_.distance || verdict.outcome == MotionOutcome::Unknown ||
+    if (!settings_.distance || verdict.outcome == MotionOutcome::Unknown || verdict.unsure.all() ||
         !needed.com.allFinite() || !needed.ground_force.allFinite() ||
         !needed.ground_torque.allFinite())
       return std::nullopt;

@@ -230,6 +230,7 @@ BOOST_AUTO_TEST_CASE(the_distance_may_be_left_out_and_makes_motions_repairable) 
 
   settings.distance = false;
   settings.verdict.repairable_distance = settings.verdict.repairable_largest_distance = 10.;
+  settings.verdict.repairable_slide = 10.;
   const MotionExamination without = examineMotion(clips.robot, recorded, settings);
   BOOST_TEST(!without.distance.has_value());
   BOOST_TEST((without.verdict.outcome == MotionOutcome::NotFeasible));

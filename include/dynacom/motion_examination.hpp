@@ -82,8 +82,8 @@ struct MotionExamination {
   MotionAnalysis analysis;  ///< gatherParts()
   MotionVerdict verdict;
   std::optional<MissingSupport> missing_support;
-  /// distanceToFeasible(), where the settings ask for it, the verdict is not Unknown and no frame
-  /// is too large for numbers. Nothing is asked of frames near jumps and near ends that are unsure;
+  /// distanceToFeasible(), where the settings ask for it, the verdict is not Unknown, some frames
+  /// are not unsure, and none is too large for numbers. Nothing is asked of frames near jumps and near ends that are unsure;
   /// around flights, contacts count that are active within half a period of the cut-off.
   std::optional<CentroidalChange> distance;
   MotionStatistics statistics;

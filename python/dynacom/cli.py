@@ -212,7 +212,10 @@ class _Request:
         from dynacom.robots import make_robot, parse_payload
 
         if (self.robot is None) == (self.urdf is None):
-            raise DynacomError("the robot must be given by --robot, or by --urdf and --contact")
+            got = "neither" if self.robot is None else "both"
+            raise DynacomError(
+                f"the robot must be given by --robot, or by --urdf and --contact, got {got}"
+            )
         if self.urdf is None and self.contact:
             raise DynacomError("--contact goes with --urdf: a robot file has its own contacts")
         if self.urdf is None:
@@ -244,13 +247,7 @@ class _Request:
         if self.ground_height is not None:
             ground["ground_height"] = self.ground_height
         if self.ground_velocity is not None:
-            try:
-                velocity = [float(text) for text in self.ground_velocity.split(",")]
-            except ValueError as error:
-                raise DynacomError(
-                    f"--ground-velocity must be X,Y,Z in m/s, got '{self.ground_velocity}'"
-                ) from error
-            ground["ground_velocity"] = velocity
+            ground["ground_velocity"] = _parse_velocity(self.ground_velocity)
         if ground:
             given["detection"] = ground
         options.update(given, "options")
@@ -480,6 +477,14 @@ def batch(
     console.print(overview_table(found, state))
     for name in ("clips.parquet", "index.html"):
         console.print(f"Wrote {out / name}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _parse_velocity(text: str) -> list[float]:
+    try:
+        x, y, z = (float(number) for number in text.split(","))
+    except ValueError as error:
+        raise DynacomError(f"--ground-velocity must be X,Y,Z in m/s, got '{text}'") from error
+    return [x, y, z]
 
 
 def _parse_shard(text: str) -> tuple[int, int]:

@@ -8,6 +8,9 @@ import numpy as np
 
 from dynacom.dynacom_pywrap import MotionExamination
 
+# From where on a distance is told as that alone, if it is not known [m].
+_FAR = 1.0
+
 
 def distance_summary(found: MotionExamination) -> dict[str, Any] | None:
     """In the summary: [m], [s]. None where nobody asked for it, or nothing can be said."""
@@ -42,6 +45,8 @@ def distance_text(
     """
     if distance["largest"] == 0.0:
         return "0 mm: the contacts can give what is needed in every frame that is judged"
+    if distance["largest"] > _FAR and not distance["converged"]:
+        return f"more than {_FAR:g} m from a feasible motion, if there is one: the search ended"
     text = (
         f"{_millimetres(distance['rms'])} from a feasible motion (RMS; "
         f"{_millimetres(distance['largest'])} at most, at {moment(distance['time'])})"

@@ -67,6 +67,7 @@ _FRAME_COLUMNS = (
     ("dcm", _XY, "m"),
     ("nl", _XY, "m"),
     ("status", ("",), ""),
+    ("judged", ("",), ""),
     ("fault", ("",), ""),
     ("residual", _WRENCH, _WRENCH_UNITS),
     ("feasible_acom", _XYZ, "m/s^2"),
@@ -618,6 +619,7 @@ def _collect_arrays(
     analysis = found.analysis
     arrays = distance_arrays(found)
     arrays["status"] = np.array([status.name for status in analysis.status])
+    arrays["judged"] = ~np.asarray(found.verdict.unsure, dtype=bool)
     arrays["fault"] = _faults_by_frame(found.verdict, options)
     names = [name for name, _, _ in _FRAME_COLUMNS if name not in arrays]
     arrays |= {name: getattr(analysis, name) for name in names}

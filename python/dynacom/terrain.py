@@ -89,11 +89,12 @@ def _slope_texts(found: MotionExamination) -> Iterator[str]:
 
 
 def _level_texts(terrain: Terrain, known: dict[str, float]) -> Iterator[str]:
-    if steps := [
-        f"{contact.name} stands at {_list_text([_text(h, 2) for h in contact.levels])} m"
-        for contact in terrain.contacts
-        if len(contact.levels) > 1
-    ]:
+    if any(len(contact.levels) > 1 for contact in terrain.contacts):
+        steps = [
+            f"{contact.name} stands at {_list_text([_text(h, 2) for h in contact.levels])} m"
+            for contact in terrain.contacts
+            if contact.levels
+        ]
         yield f"{'; '.join(steps)}: steps or stairs, or feet that float."
     elif not any(contact.slopes for contact in terrain.contacts):
         text = ", ".join(f"{name} {_text(height, 3)} m" for name, height in known.items())

@@ -173,6 +173,8 @@ constexpr double kVelocityStep = 0.1;
 constexpr double kLow = 0.03, kLowest = 0.05;
 // The ground moves if its velocity is this many times as frequent as rest, in a part of the frames.
 constexpr double kMoreFrequent = 3., kFrequent = 0.1;
+// Velocities around one count as that one if they are more than this part of those of low points.
+constexpr double kMostOfLow = 0.5;
 
 // Puts on the ground where points rest while their contact is known to be active, if they are about
 // as low as its lowest one.
@@ -200,7 +202,7 @@ void standWhereKnown(const std::vector<PointTrack>& points, const KnownContacts&
 
 Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
   std::map<std::pair<long, long>, std::vector<Eigen::Vector2d>> squares;
-  Index all = 0;
+  Index all = 0, low_points = 0;
   for (const PointTrack& point : points) {
     if (point.is_body) continue;
     const Index frames = point.position.cols();
@@ -213,28 +215,42 @@ Eigen::Vector3d findGroundVelocity(const std::vector<PointTrack>& points) {
     for (Index frame = 0; frame < frames; ++frame) {
       const Eigen::Vector3d velocity = point.velocity.col(frame);
       if (point.position(2, frame) > low || std::abs(velocity.z()) > kVelocityStep) continue;
+      ++low_points;
       squares[{std::lround(velocity.x() / kVelocityStep),
                std::lround(velocity.y() / kVelocityStep)}]
           .push_back(velocity.head<2>());
     }
   }
-  const std::size_t at_rest = squares[{0, 0}].size();
-  const auto most = std::max_element(
-      squares.begin(), squares.end(),
-      [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
-  Eigen::Vector3d ground = Eigen::Vector3d::Zero();
-  if (double(most->second.size()) <= kMoreFrequent * double(at_rest) ||
-      double(most->second.size()) < kFrequent * double(all))
-    return ground;
-  // The medians of the square and those around it, which the mode may lie close to.
-  for (int axis = 0; axis < 2; ++axis) {
-    std::vector<double> values;
+  using Square = std::pair<long, long>;
+  const auto forEachAround = [&](const Square& square, const auto& act) {
     for (long x = -1; x <= 1; ++x)
       for (long y = -1; y <= 1; ++y) {
-        const auto found = squares.find({most->first.first + x, most->first.second + y});
-        if (found == squares.end()) continue;
-        for (const Eigen::Vector2d& velocity : found->second) values.push_back(velocity[axis]);
+        const auto found = squares.find({square.first + x, square.second + y});
+        if (found != squares.end()) act(found->second);
       }
+  };
+  // Who runs rolls over its feet, at velocities that scatter over the squares around the ground's,
+  // but no others are as frequent. Rest is among those around slow ones.
+  Square mode;
+  std::size_t most = 0;
+  for (const auto& [square, velocities] : squares) {
+    const bool is_slow = std::max(std::abs(square.first), std::abs(square.second)) <= 1;
+    std::size_t size = velocities.size(), around = 0;
+    if (!is_slow) forEachAround(square, [&](const auto& others) { around += others.size(); });
+    if (double(around) > kMostOfLow * double(low_points)) size = around;
+    if (size <= most) continue;
+    most = size;
+    mode = square;
+  }
+  const auto at_rest = static_cast<double>(squares[{0, 0}].size());
+  Eigen::Vector3d ground = Eigen::Vector3d::Zero();
+  if (double(most) <= kMoreFrequent * at_rest || double(most) < kFrequent * double(all))
+    return ground;
+  for (int axis = 0; axis < 2; ++axis) {
+    std::vector<double> values;
+    forEachAround(mode, [&](const auto& around) {
+      for (const Eigen::Vector2d& velocity : around) values.push_back(velocity[axis]);
+    });
     ground[axis] = quantile(values, 0.5);
   }
   return ground;

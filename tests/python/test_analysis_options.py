@@ -141,7 +141,8 @@ def test_every_setting_can_be_set_by_a_text():
 
     every = paths(AnalysisOptions().to_dict())
     costs = repr(CentroidalFilterSettings()).count("=")
-    constants = len(every) - 2 - 5 - costs - len(dynacom.describeFaults()) * 2 - 9
+    verdict = repr(dynacom.VerdictSettings()).count("=") + len(dynacom.describeFaults())
+    constants = len(every) - 2 - 5 - costs - verdict
     assert constants == repr(DetectionSettings()).count("=") - 2 > 30
     for path in every:
         value, text = 0.51, "0.51"

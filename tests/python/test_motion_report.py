@@ -44,6 +44,7 @@ SUMMARY = [
     "clip",
     "robot",
     "mass",
+    "weight",
     "frames",
     "duration",
     "frame_rate",
@@ -619,6 +620,7 @@ def test_how_much_hangs_on_the_cut_off(talos, bare, found):
             "residual_force_rms": pytest.approx(np.sqrt((force**2).sum(axis=1).mean()), rel=1e-6),
             "residual_torque_rms": pytest.approx(np.sqrt((torque**2).sum(axis=1).mean()), rel=1e-6),
             "relaxed_share": np.mean(other["status"] == "Relaxed"),
+            "verdict": other.summary["verdict"],
             "codes": other.summary["codes"],
         }
     assert entries[0]["residual_force_rms"] != entries[2]["residual_force_rms"]

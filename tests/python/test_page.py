@@ -88,6 +88,9 @@ def test_page_in_a_browser(hurried_page, hurried, request, root):
     _, arrays, summary = hurried
     time = arrays["time"]
     with open_page(hurried_page) as tab:
+        tab.set_viewport_size(
+            {"width": 1280, "height": 1600}
+        )  # all of the scene, without scrolling
         player = open_scene(tab).locator("input.mantine-NumberInput-input")
         assert tab.locator(".verdict h2").inner_text() == "Repairable"
         for plot in ("above", *TIME_PLOTS[:-1]):
@@ -282,8 +285,10 @@ def test_feasible_walk(talos, tmp_path, monkeypatch):
     full, bare = ((tmp_path / f"{name}.html").read_text("utf-8") for name in ("full", "bare"))
     for text in (full, bare):
         assert '<section class="verdict good"><h2>Feasible</h2><p class="caption' in text
-        assert "75.0&nbsp;% of the frames" in text
-        assert text.count('class="time"') == 4 + len(summary["reasons"])
+        assert summary["feasible_share"] == 1.0
+        assert "100.0&nbsp;% of the frames" in text
+        times = 2 * len(summary["windows"]) + len(summary["reasons"])
+        assert text.count('class="time"') == times
         assert text.count("<code>") == len(summary["reasons"])
     for title in (
         *("How it depends on the filter", "Computed against the file's forces"),

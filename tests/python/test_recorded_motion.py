@@ -105,7 +105,8 @@ def test_the_cut_off_that_suits(model, rate):
 
     believed = deriveMotion(model, RecordedMotion(time, q), 0.0)
     assert not believed.is_automatic and believed.cutoff == 0.0
-    assert np.isnan(believed.noise) and not believed.unsure.any()
+    assert believed.noise == noisy.noise and not believed.unsure.any()
+    assert exact.isExact() and not noisy.isExact() and not believed.isExact()
 
 
 def test_cut_bob(shared_data):
