@@ -44,7 +44,9 @@
   const rowNames = [...data.contacts.map(({ name }) => name), ...data.statuses];
   const LEFT = 18 + 6.5 * Math.min(Math.max(...rowNames.map((name) => name.length)), LONGEST);
   const AXIS = { zeroline: false, gridcolor: "#eceff2", linecolor: "#dfe3e7", automargin: false };
-  const MARGIN = { l: 0, r: 12, t: 32, b: 28, autoexpand: false }; // above there is a legend
+  // Above there is a legend, with about five names in a row.
+  const ABOVE = 12 + 20 * Math.ceil((data.contacts.length + 1) / 5);
+  const MARGIN = { l: 0, r: 12, t: ABOVE, b: 28, autoexpand: false };
   const CONFIG = { displayModeBar: false, responsive: true, doubleClick: "reset" };
   const first = time[0];
   const last = time[count - 1];
@@ -114,7 +116,8 @@
   function drawFriction() {
     const traces = [];
     data.contacts.forEach(({ name, color }, index) => {
-      traces.push(line(name, column(`${index}.friction`), color));
+      const usage = column(`${index}.friction`);
+      if (usage.some(Number.isFinite)) traces.push(line(name, usage, color));
       const yaw = column(`${index}.yaw`);
       if (yaw.some(Number.isFinite)) {
         const more = { dash: "dot", trace: { showlegend: false } };

@@ -65,7 +65,7 @@ def write_page(
                 "parts": _parts(arrays, name),
                 "corners": sum(key.startswith(f"{number}.corner") for key in columns) // 2,
             }
-            for number, name in enumerate(robot.contacts)
+            for number, name in enumerate([*robot.contacts, *summary["bodies"]])
         ],
         "points": _points(summary),
         "colors": {name: _css(color) for name, color in scene.COLORS.items()},
@@ -186,6 +186,16 @@ def _columns(
         for corner in range(corners.shape[1]):
             columns[f"{number}.corner{corner}_x"] = corners[:, corner, 0]
             columns[f"{number}.corner{corner}_y"] = corners[:, corner, 1]
+    for number, link in enumerate(summary["bodies"], len(robot.contacts)):
+        key = f"body.{link}"
+        columns[f"{number}.active"] = arrays[f"{key}.active"]
+        columns[f"{number}.confidence"] = arrays[f"{key}.confidence"]
+        columns[f"{number}.force"] = arrays[f"{key}.force"][:, 2] / weight
+        for usage in ("friction", "yaw"):  # of which nothing is known
+            columns[f"{number}.{usage}"] = np.full(len(arrays["time"]), np.nan)
+        columns[f"{number}.corner0_x"], columns[f"{number}.corner0_y"] = arrays[
+            f"{key}.position"
+        ].T[:2]
     return columns
 
 

@@ -29,7 +29,10 @@ COLORS = {
     "feasible_com": (122, 81, 149),
     "support": (240, 228, 66),
 }
-CONTACT_COLORS = ((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
+CONTACT_COLORS = (
+    *((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233)),
+    *((140, 86, 75), (110, 110, 20), (23, 122, 130), (127, 127, 127)),
+)
 
 # More frames than these make pages that are too large, and too slow to go back in.
 _MOST_FRAMES = 900

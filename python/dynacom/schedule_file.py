@@ -68,12 +68,15 @@ def read_schedule(path: str | Path, time: np.ndarray, contacts: Sequence[str]) -
     active = np.zeros((len(time), len(contacts)), dtype=bool)
     for name, intervals in content.items():
         where = f"{path}: contact '{name}'"
-        for first, last in _read_intervals(intervals, where):
-            if first > time[-1] + tolerance or last < time[0] - tolerance:
-                raise DynacomError(
-                    f"{where}: times must be those of the clip, {time[0]:g} to {time[-1]:g} s, got "
-                    f"{first:g} to {last:g}"
-                )
+        pairs = _read_intervals(intervals, where)
+        if pairs and all(
+            first > time[-1] + tolerance or last < time[0] - tolerance for first, last in pairs
+        ):
+            raise DynacomError(
+                f"{where}: times must be those of the clip, {time[0]:g} to {time[-1]:g} s, got "
+                f"{pairs[0][0]:g} to {pairs[-1][1]:g}"
+            )
+        for first, last in pairs:
             inside = (time >= first - tolerance) & (time <= last + tolerance)
             active[inside, list(contacts).index(name)] = True
     return ContactSchedule(list(contacts), active)

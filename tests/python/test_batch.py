@@ -88,10 +88,10 @@ def test_numbers_too_large_end_no_batch(walks, tmp_path):
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "huge_0.npz" in page
     assert "discontinuity (3 frames, up to ∞ of the greatest speed)" in page
-    console = Console(file=io.StringIO(), width=200)
+    console = Console(file=io.StringIO(), width=120)
     console.print(summary_table(dynacom.analyze(path, ROBOT).summary))
     assert "– of the weight" in console.file.getvalue()
-    assert max(map(len, console.file.getvalue().split())) < 60
+    assert not re.search(r"\d{20}", console.file.getvalue())
 
 
 def test_a_row_for_each_file_whatever_it_is(clips, result):

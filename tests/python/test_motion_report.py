@@ -163,6 +163,7 @@ def test_arrays_are_those_of_the_steps_by_hand(talos, walk, flat):
         }
         expected |= {f"contact.{contact.name}.{name}": value for name, value in values.items()}
     expected["fault"] = [""] * len(walk.time)
+    expected["judged"] = [True] * len(walk.time)
     change = dynacom.distanceToFeasible(split, corners, parts, inference.schedule)
     expected["distance"] = np.linalg.norm(change.com, axis=1)
     expected["feasible_com"] = analysis.com + change.com

@@ -277,7 +277,10 @@ def test_feasible_walk(talos, tmp_path, monkeypatch):
     """No reason stands open, and what there is not is not there."""
     monkeypatch.setitem(sys.modules, "viser", None)
     q, arrays, summary = walk_report(talos)
-    write_page(tmp_path / "full.html", talos, q, arrays, summary)
+    tried = {"cutoff": 6.0, "residual_force_rms": 0.1, "residual_torque_rms": 0.02}
+    tried |= {"verdict": "feasible", "codes": ["feasible"], "relaxed_share": 0.1}
+    filtered = summary | {"cutoff": 6.0, "cutoff_sensitivity": [tried]}
+    write_page(tmp_path / "full.html", talos, q, arrays, filtered)
     arrays = {name: array for name, array in arrays.items() if "measured" not in name}
     none = {"notes": [], "cutoff_sensitivity": [], "measured": {}, "ground": {}, "cutoff": None}
     none["distance"] = None

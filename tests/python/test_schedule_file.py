@@ -126,7 +126,7 @@ def test_a_folder_that_is_not_there(tmp_path):
         ("left: [[0.2, 0.2]]", ["..#...", "......"]),
         ("left: [[0.11, 0.19]]", ["......", "......"]),  # between frames
         ("left: [[0.05, 0.25]]", [".##...", "......"]),
-        ("left: [[7, 9]]", ["......", "......"]),
+        ("left: [[7, 9], [0.5, 0.6]]", [".....#", "......"]),
         ("left: [[0.3, 0.4], [0, 0.1], [0.1, 0.3]]", ["#####.", "......"]),  # in any order
         ("left: [[1e-1, 3e-1]]", [".###..", "......"]),
         ("left: [[0.1000001, 0.2999999]]", [".###..", "......"]),
@@ -143,7 +143,8 @@ def test_edits(read, text, expected):
 def test_a_single_frame(read):
     assert read("left: [[0.2, 0.4]]", time=np.array([0.3])) == ["#", "."]
     assert read("left: [[0.3, 0.3]]", time=np.array([0.3])) == ["#", "."]
-    assert read("left: [[0.302, 0.4]]", time=np.array([0.3])) == [".", "."]
+    with pytest.raises(DynacomError, match=r"contact 'left': times .* 0.3 to 0.3 s, got 0.302"):
+        read("left: [[0.302, 0.4]]", time=np.array([0.3]))
 
 
 def test_contacts_with_odd_names(read):

@@ -6,6 +6,7 @@ import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose
 
+import dynacom
 from dynacom import DistributionStatus, DynaCoM
 from dynacom.robots import Robot
 from helpers import assert_gives_wrench, assert_within_cones, to_com
@@ -86,3 +87,12 @@ def test_crocoddyl_walk(shared_data, robot):
             assert_allclose(force, wrenches[standing[0]], rtol=0, atol=1e-11 * weight)
             singles += 1
     assert singles >= 30
+
+
+def test_a_run_on_a_treadmill(shared_data):
+    """Its belt, at 2 m/s, is found, although who runs rolls over the feet."""
+    folder = shared_data / "forces"
+    report = dynacom.analyze(folder / "hamner_run_2mps.npz", folder / "hamner.yaml")
+    assert_allclose(report.summary["ground_velocity"], [-2.0, 0.0, 0.0], rtol=0, atol=0.1)
+    assert any("a treadmill" in note for note in report.summary["notes"])
+    assert report.summary["distance"]["rms"] < 0.005
