@@ -91,8 +91,7 @@ class Bench:
 
     def examination(self, clip, frames):
         """{step: seconds} of the first frames: each step as a call of its own."""
-        times, q, error = clip.time[:frames], clip.q[:frames], clip.quaternion_error[:frames]
-        recorded = dynacom.RecordedMotion(times, q, error)
+        recorded = dynacom.RecordedMotion(clip.time[:frames], clip.q[:frames])
         robot, options, seconds = self.robot, self.job.options, Counter()
         model, cutoff = robot.getModel(), options.cutoff_number
 

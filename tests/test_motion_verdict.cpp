@@ -518,6 +518,7 @@ BOOST_AUTO_TEST_CASE(what_is_close_to_a_feasible_motion_is_repairable) {
   Stand sliding;
   sliding.motion.v.row(0).segment(10, 20).setConstant(0.249);
   BOOST_TEST(holdsAlone(sliding.judge(), MotionFault::FootSliding, 20, 0.249, 0.1));
+  sliding.settings.repairable_slide = 0.05;
   BOOST_TEST((weigh(sliding, 0., 0.) == MotionOutcome::Repairable));  // by 4.98 cm
   sliding.motion.v.row(0).segment(10, 20).setConstant(0.251);
   BOOST_TEST((weigh(sliding, 0., 0.) == MotionOutcome::NotFeasible));

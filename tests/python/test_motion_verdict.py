@@ -59,7 +59,7 @@ NUMBERS = {
     "repairable_distance": 0.01,
     "repairable_largest_distance": 0.05,
     "repairable_depth": 0.07,
-    "repairable_slide": 0.05,
+    "repairable_slide": 0.3,
 }
 POSITIVE = (
     *("linear_speed", "turning_speed", "joint_speed"),
