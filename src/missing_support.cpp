@@ -5,8 +5,8 @@
 #include <array>
 
 #include "check.hpp"
-#include "nan.hpp"
 #include "motion_windows.hpp"
+#include "nan.hpp"
 #include "standard_gravity.hpp"
 
 namespace dynacom {

@@ -83,8 +83,9 @@ struct MotionExamination {
   MotionVerdict verdict;
   std::optional<MissingSupport> missing_support;
   /// distanceToFeasible(), where the settings ask for it, the verdict is not Unknown, some frames
-  /// are not unsure, and none is too large for numbers. Nothing is asked of frames near jumps and near ends that are unsure;
-  /// around flights, contacts count that are active within half a period of the cut-off.
+  /// are not unsure, and none is too large for numbers. Nothing is asked of frames near jumps and
+  /// near ends that are unsure; around flights, contacts count that are active within half a period
+  /// of the cut-off.
   std::optional<CentroidalChange> distance;
   MotionStatistics statistics;
   std::vector<CutoffSensitivity> sensitivity;  ///< with half, and with twice the cut-off

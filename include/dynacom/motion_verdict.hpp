@@ -105,9 +105,9 @@ struct DYNACOM_EXPORT VerdictSettings {
   /// distanceToFeasible(). Well retargeted clips need 0.2 to 4 mm, kicks and sprints up to 10;
   /// three joints mixed up 16, a robot that leans 5 cm too far 50.
   double repairable_distance = 0.01, repairable_largest_distance = 0.05;
-  /// Nor is one whose contacts are deeper below their ground than this, if that is a fault, or slide
-  /// by more than the second in a row of frames that are beyond the limit, > 0 [m]. The toes of
-  /// people who push off seem to be 6 cm deep where they were measured by markers; feet of
+  /// Nor is one whose contacts are deeper below their ground than this, if that is a fault, or
+  /// slide by more than the second in a row of frames that are beyond the limit, > 0 [m]. The toes
+  /// of people who push off seem to be 6 cm deep where they were measured by markers; feet of
   /// retargeted dances slide by 12 to 26 cm, and what slides farther makes a step.
   double repairable_depth = 0.07, repairable_slide = 0.3;
 
