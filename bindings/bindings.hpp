@@ -31,6 +31,7 @@ void exposeContactSchedule();
 void exposeCollisionPoints();
 void exposeContactInference();
 void exposeCentroidalFilter();
+void exposeMotionRepair();
 void exposeRecordedMotion();
 void exposeMotionAnalysis();
 void exposeMotionVerdict();

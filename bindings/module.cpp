@@ -43,6 +43,7 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeCollisionPoints();
   exposeContactInference();
   exposeCentroidalFilter();
+  exposeMotionRepair();
   exposeMotionVerdict();
   exposeMissingSupport();
   exposeTerrain();

@@ -140,6 +140,32 @@ BOOST_AUTO_TEST_CASE(the_last_answer_changes_how_fast_it_is_and_not_what_is_foun
   }
 }
 
+BOOST_AUTO_TEST_CASE(what_can_be_given_is_so_exactly_if_that_is_asked_for) {
+  // A robot that sways to the front edges of its soles. All of its wrench can be given, but slopes
+  // are small long before.
+  Problem problem;
+  problem.levers.resize(3, 8);
+  problem.levers << 0.0707968, -0.129203, -0.129202, 0.0707982, 0.0667158, -0.133284, -0.133283,
+      0.0667172,                                                                         //
+      0.159872, 0.15987, 0.03987, 0.0398724, -0.0401276, -0.04013, -0.16013, -0.160128,  //
+      -0.698994, -0.699019, -0.699018, -0.698993, -0.698994, -0.699019, -0.699018, -0.698993;
+  problem.wrench << -0.0997131, 0.000951502, 1.00941, -5.33326e-07, -4.28365e-05, -5.54506e-07;
+  problem.mu.assign(8, 0.7);
+  ConeProjection exact(1., ConeProjection::kExact), coarse(1.);
+  for (ConeProjection* projection : {&exact, &coarse})
+    projection->project(problem.wrench, problem.levers, problem.mu, 0xff);
+  BOOST_TEST(exact.residual().norm() < 1e-9);
+  BOOST_TEST(coarse.residual().norm() > 1e-4);
+  BOOST_TEST(coarse.residual().norm() < 1e-3);
+  // Forces of points are those that make what is given.
+  Vector6 given = Vector6::Zero();
+  for (Index k = 0; k < 8; ++k) {
+    given.head<3>() += exact.force(int(k));
+    given.tail<3>() += problem.levers.col(k).cross(exact.force(int(k)));
+  }
+  BOOST_TEST(close(given + exact.residual(), problem.wrench));
+}
+
 BOOST_AUTO_TEST_CASE(nobody_gives_nothing_and_nothing_takes_nothing) {
   Random random(3);
   const Problem problem = randomProblem(random);

@@ -19,12 +19,7 @@ namespace {
 struct Puppet {
   Puppet() {
     model = singleBody(10., {});
-    for (const char* name : {"left", "right"}) {
-      const auto joint = model.addJoint(1, pinocchio::JointModelTranslation(), SE3::Identity(),
-                                        std::string(name) + "_joint");
-      model.addFrame(pinocchio::Frame(std::string(name) + "_foot", joint, SE3::Identity(),
-                                      pinocchio::OP_FRAME));
-    }
+    addFeet(model);
     robot.emplace(model);
     for (const char* name : {"left", "right"})
       robot->addContact(makeSole(std::string(name) + "_foot"), name);

@@ -11,9 +11,6 @@ namespace dynacom::internal {
 
 namespace {
 
-// An edge whose slope along the residual is less than this part of the wrench brings nothing: costs
-// are told apart by hundredths of the weight.
-constexpr double kGain = 1e-6;
 // A direction is taken to be within the span of the others if the square of its part outside is
 // smaller than this.
 constexpr double kDependent = 1e-10;
@@ -86,6 +83,13 @@ double ConeProjection::lift(std::uint32_t set) const {
   return sum;
 }
 
+Eigen::Vector3d ConeProjection::force(int point) const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int k = 0; k < count_; ++k)
+    if (edges_[k].point == point) sum += factors_[k] * columns_.col(k).head<3>();
+  return sum;
+}
+
 ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
                                                  const Eigen::Matrix3Xd& levers,
                                                  const std::vector<double>& mu, std::uint32_t set) {
@@ -108,6 +112,9 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
   std::copy_n(solution_.begin(), count_, factors_.begin());
 
   Vector6& residual = residual_;
+  // Edges that are within the span of those that push, although rounding says that they would help.
+  std::array<Edge, kRounds> useless;
+  auto useless_end = useless.begin();
   for (int round = 0; round < kRounds; ++round) {
     residual = target_;
     for (int k = 0; k < count_; ++k) residual -= factors_[k] * columns_.col(k);
@@ -116,7 +123,7 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
     // The best edge of each point, and the best of these.
     const Eigen::Vector3d force = residual.head<3>(), torque = residual.tail<3>() / lever_;
     Edge best = {-1, 0, 0};
-    double slope = kGain * size;
+    double slope = gain_ * size;
     for (std::uint32_t rest = set; rest != 0; rest &= rest - 1) {
       const int point = __builtin_ctz(rest);
       const Eigen::Vector3d pull = force + torque.cross(Eigen::Vector3d(levers.col(point)));
@@ -126,14 +133,20 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
       const Edge edge = {std::int8_t(point), std::int8_t(pull.x() < 0. ? -1 : 1),
                          std::int8_t(pull.y() < 0. ? -1 : 1)};
       const auto known = edges_.begin() + count_;
-      if (std::find(edges_.begin(), known, edge) == known) best = edge, slope = value;
+      if (std::find(edges_.begin(), known, edge) != known ||
+          std::find(useless.begin(), useless_end, edge) != useless_end)
+        continue;
+      best = edge;
+      slope = value;
     }
     if (best.point < 0 || count_ == kEdges) break;
     add(best, direction(best, levers, mu));
     if (!solve()) {
       drop(count_ - 1);
-      break;
+      *useless_end++ = best;
+      continue;
     }
+    useless_end = useless.begin();
     // On the way to the new factors, whichever becomes zero first is left.
     for (;;) {
       double step = 1.;

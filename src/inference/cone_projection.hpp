@@ -26,8 +26,14 @@ class ConeProjection {
     double force, torque;  // norms, of the parts of a wrench as it was given
   };
 
+  /// What is missing where nothing is: a thousandth of the wrench, and a millionth. The square of
+  /// the distance is as exact as the slopes below are small.
+  static constexpr double kCoarse = 1e-6, kExact = 1e-12;
+
   /// @param lever  ℓ: closest is what has the least ‖force‖² + ‖moment‖²/ℓ² [m]
-  explicit ConeProjection(double lever) : lever_(lever) {}
+  /// @param gain   an edge whose slope along the residual is less than this part of the wrench
+  ///               brings nothing
+  explicit ConeProjection(double lever, double gain = kCoarse) : lever_(lever), gain_(gain) {}
 
   /// The edges that made up the last answer are tried first: consecutive frames have much in
   /// common.
@@ -48,6 +54,9 @@ class ConeProjection {
   /// The vertical force that some points gave together in the last answer. There may be other
   /// answers that are as close.
   double lift(std::uint32_t set) const;
+
+  /// The force of a point in the last answer; see lift().
+  Eigen::Vector3d force(int point) const;
 
   /// The edge of a pyramid, along which a point pushes.
   struct Edge {
@@ -77,7 +86,7 @@ class ConeProjection {
   void drop(int position);
   bool solve();
 
-  const double lever_;
+  const double lever_, gain_;
   int count_ = 0;
   std::array<Edge, kEdges> edges_ = {};
   Eigen::Matrix<double, 6, kEdges> columns_;

@@ -11,7 +11,7 @@
 #include "../settings_fields.hpp"
 #include "../standard_gravity.hpp"
 #include "centroidal_window.hpp"
-#include "dynacom/contact_point.hpp"
+#include "part_sets.hpp"
 
 namespace dynacom {
 
@@ -61,15 +61,12 @@ struct Window {
 };
 
 void requireFitting(const internal::ContactSplit& parts, const std::vector<ContactMotion>& motions,
-                    const MotionAnalysis& dynamics, const ContactSchedule& schedule,
+                    const MotionAnalysis& dynamics,
                     const Eigen::Array<bool, Eigen::Dynamic, 1>& free) {
   const Index frames = dynamics.time.size();
   const std::size_t count = parts.parts.size();
   internal::requireTime(dynamics.time);
   requireSize("motions", motions.size(), count, "parts");
-  if (count > ConeProjection::kMaximalPoints)
-    internal::throwInvalid("contacts must have at most ", ConeProjection::kMaximalPoints,
-                           " parts, got ", count);
   for (const ContactMotion& motion : motions)
     requireSize("motions", motion.position.cols(), frames, "frames (as many as dynamics)");
   for (const auto* values : {&dynamics.com, &dynamics.ground_force, &dynamics.ground_torque}) {
@@ -77,24 +74,7 @@ void requireFitting(const internal::ContactSplit& parts, const std::vector<Conta
     if (!values->allFinite())
       internal::throwInvalid("dynamics must have finite CoM and ground wrench");
   }
-  schedule.validate(frames);
   if (free.size() != 0) requireSize("free", free.size(), frames, "frames (or none)");
-}
-
-std::vector<std::uint32_t> listSets(const internal::ContactSplit& parts,
-                                    const ContactSchedule& schedule, Index frames) {
-  std::vector<std::uint32_t> sets(static_cast<std::size_t>(frames), 0);
-  for (std::size_t row = 0; row < schedule.names.size(); ++row) {
-    const auto part = std::find_if(
-        parts.parts.begin(), parts.parts.end(),
-        [&](const PartRobot::Part& other) { return other.name == schedule.names[row]; });
-    if (part == parts.parts.end())
-      internal::throwInvalid("schedule names '", schedule.names[row], "', which is no part");
-    const std::uint32_t bit = std::uint32_t(1) << (part - parts.parts.begin());
-    for (Index frame = 0; frame < frames; ++frame)
-      if (schedule.active(Index(row), frame)) sets[static_cast<std::size_t>(frame)] |= bit;
-  }
-  return sets;
 }
 
 CentroidalProblem describe(const internal::ContactSplit& parts,
@@ -109,13 +89,9 @@ CentroidalProblem describe(const internal::ContactSplit& parts,
   problem.wrench << dynamics.ground_force, dynamics.ground_torque;
   problem.gravity = internal::findUnitGravity(parts.carrier.gravity);
   problem.wrench /= parts.carrier.mass * problem.gravity;
-  for (std::size_t k = 0; k < motions.size(); ++k) {
-    const auto* point = dynamic_cast<const ContactPoint*>(parts.carrier.contacts[k].contact.get());
-    if (!point) internal::throwInvalid("part '", parts.parts[k].name, "' must be a ContactPoint");
-    problem.points.push_back(&motions[k].position);
-    problem.mu.push_back(point->getSettings().mu);
-  }
-  problem.sets = listSets(parts, schedule, frames);
+  for (const ContactMotion& motion : motions) problem.points.push_back(&motion.position);
+  problem.mu = internal::listFriction(parts);
+  problem.sets = internal::listSets(parts.parts, schedule, frames);
   problem.free = free;
   if (free.size() == 0) problem.free.setConstant(frames, false);
   return problem;
@@ -181,7 +157,7 @@ CentroidalChange internal::distanceToFeasible(const ContactSplit& parts,
                                               const Eigen::Array<bool, Eigen::Dynamic, 1>& free,
                                               Workers& workers) {
   settings.validate();
-  requireFitting(parts, motions, dynamics, schedule, free);
+  requireFitting(parts, motions, dynamics, free);
   const CentroidalProblem problem = describe(parts, motions, dynamics, schedule, free);
   const Index frames = problem.time.size();
   const double weight = parts.carrier.mass * problem.gravity;

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include <map>
+#include <string>
+
+#include "bindings.hpp"
+#include "dynacom/motion_repair.hpp"
+
+namespace dynacom::python {
+
+namespace {
+
+using Settings = RepairSettings;
+
+const char* getMeaning(const std::string& field) {
+  static const std::map<std::string, const char*> all = {
+      {"displacement",
+       "The displacement of the root and of joints that slide that costs 1 in a second [m]"},
+      {"turn", "The turn of the root and of joints that costs 1 in a second [rad]"},
+      {"linear_acceleration",
+       "The change of the acceleration of what is displaced that costs 1 in a second [m/s^2]"},
+      {"angular_acceleration",
+       "The change of the acceleration of what turns that costs 1 in a second [rad/s^2]"},
+      {"friction_margin", "Which part of the friction is left unused"},
+      {"support_margin", "How far inside what carries wrenches press [m]"},
+      {"held_point", "What parts that carry are off their places costs 1 if it is this [m]"},
+      {"largest_drift", "Contacts that drift by no more than this in a stance are held still [m]"},
+      {"window", "What is longer is repaired in windows of this length [s]"},
+      {"overlap", "Windows take in so much behind them [s]"},
+  };
+  return all.at(field);
+}
+
+bp::list getStances(const RepairedMotion& repaired) { return toList(repaired.stances); }
+
+std::string writeStance(const RepairedStance& stance) {
+  return internal::concat("RepairedStance(contact=", stance.contact, ", first=", stance.first,
+                          ", behind=", stance.behind, ", drift=", stance.drift,
+                          ", is_still=", stance.is_still ? "True" : "False", ")");
+}
+
+std::string writeMotion(const RepairedMotion& repaired) {
+  return internal::concat("RepairedMotion(frames=", repaired.change.cols(),
+                          ", root_rms=", repaired.root_rms, ", joint_rms=", repaired.joint_rms,
+                          ", within_reach=", repaired.within_reach ? "True" : "False", ")");
+}
+
+RepairedMotion repair(const PartRobot& parts, const Motion& motion, const ContactSchedule& schedule,
+                      const Settings& settings, const bp::object& free) {
+  Eigen::Array<bool, Eigen::Dynamic, 1> free_frames;
+  if (!free.is_none())
+    free_frames = bp::extract<Eigen::Matrix<bool, Eigen::Dynamic, 1>>(free)().array();
+  const WithoutLock unlocked;
+  return repairMotion(parts, motion, schedule, settings, free_frames);
+}
+
+}  // namespace
+
+void exposeMotionRepair() {
+  bp::class_<Settings> settings(
+      "RepairSettings",
+      "What changes of a motion cost in repairMotion, and how far from the limits it ends.");
+  for (const auto& [name, field] : Settings::fields())
+    settings.add_property(name, bp::make_getter(field), bp::make_setter(field), getMeaning(name));
+  settings.def(SettingsVisitor<Settings>());
+
+  bp::class_<RepairedStance>("RepairedStance",
+                             "What was made of a contact that carries for some time.", bp::no_init)
+      .def_readonly("contact", &RepairedStance::contact, "Its place: PartRobot.Part.contact")
+      .def_readonly("first", &RepairedStance::first, "Frame")
+      .def_readonly("behind", &RepairedStance::behind, "The frame after the last")
+      .def_readonly("drift", &RepairedStance::drift,
+                    "Largest distance of a part from where it is on average, before [m]")
+      .def_readonly("is_still", &RepairedStance::is_still, "Whether it was held still")
+      .def(PrintVisitor<RepairedStance>(&writeStance))
+      .def(CopyVisitor<RepairedStance>());
+
+  bp::class_<RepairedMotion>("RepairedMotion",
+                             "A motion whose contacts can give what it needs, near another one.",
+                             bp::no_init)
+      .def_readonly("motion", &RepairedMotion::motion, "The Motion")
+      .add_property("change", &Rows<&RepairedMotion::change>::get,
+                    "Of the configurations, in the tangent space before, (T, nv)")
+      .add_property("residual", &Rows<&RepairedMotion::residual>::get,
+                    "What contacts still cannot give, force and moment about the CoM, (T, 6)\n"
+                    "[N, N m]; zero in frames that are free")
+      .add_property("stances", &getStances, "A RepairedStance for each")
+      .def_readonly("root_rms", &RepairedMotion::root_rms,
+                    "Root mean square of the root's displacement [m]")
+      .def_readonly("root_largest", &RepairedMotion::root_largest, "The largest [m]")
+      .def_readonly("joint_rms", &RepairedMotion::joint_rms,
+                    "Root mean square of the changes of joints [rad]")
+      .def_readonly("joint_largest", &RepairedMotion::joint_largest, "The largest [rad]")
+      .def_readonly("held_largest", &RepairedMotion::held_largest,
+                    "Largest distance of a part that carries from its place [m]")
+      .def_readonly("within_reach", &RepairedMotion::within_reach,
+                    "Whether all wrenches are within reach, but for 1e-6 of the weight")
+      .def(PrintVisitor<RepairedMotion>(&writeMotion))
+      .def(CopyVisitor<RepairedMotion>());
+
+  bp::def(
+      "repairMotion", &repair,
+      (bp::arg("parts"), bp::arg("motion"), bp::arg("schedule"), bp::arg("settings") = Settings(),
+       bp::arg("free") = bp::object()),
+      "The RepairedMotion: the smallest change d(t) of a motion's configurations after which\n"
+      "contacts can give the wrench of each frame, of the derivatives that differentiate()\n"
+      "gives it, and parts that carry are held at their places. Minimises the integral of\n"
+      "|d|^2 and |d''|^2 over the squares of settings, by Gauss-Newton and the alternating\n"
+      "direction method of multipliers. parts: of splitContacts, with a free-flyer as root;\n"
+      "motion: whose time and q are read, four frames at least; schedule: of the parts; free:\n"
+      "(T,), frames of whose wrench nothing is asked. A motion whose wrenches are within reach\n"
+      "comes back as it is. Raises ValueError if settings or the motion are not valid, the\n"
+      "schedule names a part that there is not, or sizes differ.");
+}
+
+}  // namespace dynacom::python

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <iosfwd>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dynacom/contact_parts.hpp"
+#include "dynacom/motion.hpp"
+
+namespace dynacom {
+
+/// What changes of a motion cost in repairMotion(), and how far from the limits it ends.
+struct DYNACOM_EXPORT RepairSettings {
+  /// Displacements of the root and of joints that slide [m], and turns of the root and of joints
+  /// [rad], that cost 1 in a second each.
+  double displacement = 0.01, turn = 0.02;
+  /// The changes of their accelerations that do [m/s²], [rad/s²].
+  double linear_acceleration = 1., angular_acceleration = 10.;
+  /// By which part friction is left unused, and how far inside what carries wrenches press [m], so
+  /// that a motion that is written and read again is still feasible.
+  double friction_margin = 0.02, support_margin = 0.001;
+  /// What parts that carry are off their places costs 1 in a second if it is this [m].
+  double held_point = 0.0005;
+  /// A contact that moves by no more than this in a stance stands still in it, where it is on
+  /// average; one that drifts by more moves as it did [m].
+  double largest_drift = 0.02;
+  /// What is longer is repaired in windows of this length, each with so much behind it [s].
+  double window = 10., overlap = 2.;
+
+  using Field = std::pair<const char*, double RepairSettings::*>;
+  /// All fields by name.
+  static const std::vector<Field>& fields();
+
+  /// @throws std::invalid_argument naming the first field out of its range: all are finite and > 0,
+  ///         but margins and the largest drift may be 0, and the friction margin is < 1
+  void validate() const;
+  std::string to_string() const;
+  bool operator==(const RepairSettings& other) const;
+  bool operator!=(const RepairSettings& other) const { return !(*this == other); }
+};
+
+DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const RepairSettings& settings);
+
+/// What was made of a contact that carries for some time.
+struct RepairedStance {
+  std::size_t contact;         ///< whose parts these are: PartRobot::Part::contact
+  Eigen::Index first, behind;  ///< frames
+  double drift;   ///< largest distance of a part from where it is on average, before [m]
+  bool is_still;  ///< whether it was held still
+};
+
+/// A motion whose contacts can give what it needs, near another one.
+struct DYNACOM_EXPORT RepairedMotion {
+  Motion motion;           ///< with the derivatives of differentiate()
+  Eigen::MatrixXd change;  ///< of the configurations, in the tangent space before, nv × frames
+  /// What contacts still cannot give, (force [N], moment [N·m]) about the CoM, 6 × frames; zero in
+  /// frames that are free.
+  Eigen::Matrix<double, 6, Eigen::Dynamic> residual;
+  std::vector<RepairedStance> stances;
+  double root_rms = 0., root_largest = 0.;    ///< of the root's displacement [m]
+  double joint_rms = 0., joint_largest = 0.;  ///< of the changes of joints that turn [rad]
+  double held_largest = 0.;  ///< distance of a part that carries from its place [m]
+  /// Whether all wrenches are within reach, but for 1e-6 of the weight.
+  bool within_reach = true;
+};
+
+/// Finds the smallest change of a motion after which its contacts can give what it needs: changes
+/// d_t of the configurations that minimise
+///
+///     ∫ ‖d‖²/σ_d² + ‖d̈‖²/σ_a² dt
+///
+/// while the wrench of each frame, of the velocities and accelerations that differentiate() gives
+/// it, is within what its contacts can give where they are then. Parts that carry are held at their
+/// places. Gauss–Newton over the whole motion: wrenches are linearised by the derivatives of the
+/// centroidal dynamics (Carpentier and Mansard, Analytical Derivatives of Rigid Body Dynamics
+/// Algorithms, 2018), and split from the changes as in distanceToFeasible(); a last step takes the
+/// nearest motion within all cones, without costs. What takes place in frames of which nothing is
+/// asked, or has no feasible motion nearby, shows in the residual.
+///
+/// A motion whose wrenches are all within reach comes back as it is, bit for bit.
+/// @param parts     whose contacts are points, of splitContacts(); the root must be a free-flyer
+/// @param motion    whose time and configurations are read; four frames at least
+/// @param schedule  of the parts, by their names; without schedule a part never carries
+/// @param settings  costs and margins
+/// @param free      frames of whose wrench nothing is asked; empty if there are none
+/// @throws std::invalid_argument if settings or the motion are not valid, the root is another, the
+///         schedule names a part that there is not, sizes differ, or there are more than 32 parts
+DYNACOM_EXPORT RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
+                                           const ContactSchedule& schedule,
+                                           const RepairSettings& settings = {},
+                                           const Eigen::Array<bool, Eigen::Dynamic, 1>& free = {});
+
+}  // namespace dynacom

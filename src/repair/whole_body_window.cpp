@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "whole_body_window.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <pinocchio/algorithm/joint-configuration.hpp>
+
+namespace dynacom::internal {
+
+using Eigen::Index;
+
+namespace {
+
+// Of ADMM: the penalty for what cannot be given, squared, in a second, and how much more in flight,
+// where there is nothing to choose; over-relaxation; and how often it linearises, and iterates
+// then.
+constexpr double kPenalty = 2000., kFlight = 300., kRelaxation = 1.6;
+constexpr int kRounds = 2, kIterations = 12;
+// Then, costs count no more: the nearest motion within the cones, with a larger penalty.
+constexpr double kPolish = 100.;
+constexpr int kPolishes = 8, kPolishIterations = 4;
+// What is missing after that is rounding [m g, m g·m].
+constexpr double kReached = 1e-8;
+// Moments count as forces with this lever [m].
+constexpr double kLever = 1.;
+
+template <class Function>
+void forEachPoint(std::uint32_t set, Function act) {
+  for (; set != 0; set &= set - 1) act(Index(__builtin_ctz(set)));
+}
+
+}  // namespace
+
+Eigen::Matrix<double, 6, 1> findResidual(ConeProjection& projection, const LinearizedFrame& linear,
+                                         const std::vector<double>& mu, std::uint32_t set) {
+  projection.project(linear.wrench, linear.points.colwise() - linear.com, mu, set);
+  return projection.residual();
+}
+
+WholeBodyWindow::WholeBodyWindow(const WholeBodyProblem& problem, const RepairSettings& settings)
+    : problem_(problem),
+      settings_(settings),
+      linearizer_(problem.model, problem.points),
+      projection_(kLever, ConeProjection::kExact) {
+  for (const double mu : problem.mu) mu_.push_back(mu * (1. - settings.friction_margin));
+}
+
+void WholeBodyWindow::solve(Index first, Index behind, Eigen::MatrixXd& change,
+                            Eigen::MatrixXd& q) {
+  begin(first, behind);
+  for (int round = 0; round < kRounds; ++round) {
+    linearize(q);
+    if (round == 0) restart();
+    if (!factorize(kPenalty)) return;
+    for (int k = 0; k < kIterations; ++k) {
+      iterate(true, change);
+      project(true);
+    }
+    apply(change, q);
+  }
+  for (int round = 0; round < kPolishes && linearize(q) > kReached; ++round) {
+    restart();
+    if (!factorize(kPenalty * kPolish)) return;
+    for (int k = 0; k < kPolishIterations; ++k) {
+      iterate(false, change);
+      project(false);
+    }
+    apply(change, q);
+  }
+}
+
+// The frames whose wrench depends on what is sought.
+void WholeBodyWindow::begin(Index first, Index behind) {
+  first_ = first;
+  behind_ = behind;
+  constraints_.clear();
+  const Index frames = problem_.time.size();
+  for (Index frame = 0; frame < frames; ++frame) {
+    const auto [low, high] = MotionLinearizer::findReach(frame, frames);
+    if (high < first || low >= behind) continue;
+    Constraint& constraint = constraints_.emplace_back();
+    constraint.frame = frame;
+    constraint.dual.setZero();
+  }
+}
+
+// A path that stays at its first and last place before and behind the motion.
+WholeBodyWindow::Difference WholeBodyWindow::differ(Index frame) const {
+  const Index last = problem_.time.size() - 1;
+  const auto stepFrom = [&](Index k) { return problem_.time[k + 1] - problem_.time[k]; };
+  const double before = stepFrom(std::max<Index>(frame - 1, 0));
+  const double after = stepFrom(std::min(frame, last - 1));
+  const double duration = 0.5 * (before + after);
+  const double to_before = frame > 0 ? 1. / (before * duration) : 0.;
+  const double to_after = frame < last ? 1. / (after * duration) : 0.;
+  return {to_before, -to_before - to_after, to_after, duration};
+}
+
+// Says how much is missing at the most.
+double WholeBodyWindow::linearize(const Eigen::MatrixXd& q) {
+  double worst = 0.;
+  for (Constraint& constraint : constraints_) {
+    const Index frame = constraint.frame;
+    const std::uint32_t set = problem_.sets[static_cast<std::size_t>(frame)];
+    LinearizedFrame& linear = constraint.linear;
+    linearizer_.linearize(problem_.time, q, frame, set, linear);
+    constraint.off.setZero(3, linear.points.cols());
+    forEachPoint(set, [&](Index point) {
+      constraint.off.col(point) =
+          linear.points.col(point) - problem_.targets[static_cast<std::size_t>(point)].col(frame);
+    });
+    constraint.moved = linear.wrench;
+    if (!problem_.free[frame]) {
+      projection_.setAnswer(constraint.answer);
+      worst = std::max(worst, findResidual(projection_, linear, problem_.mu, set).norm());
+    }
+    shrink(constraint);
+  }
+  return worst;
+}
+
+// Makes the cones smaller by the margins, and adds to the derivative of the moment that of the
+// levers at which the forces push that are there.
+void WholeBodyWindow::shrink(Constraint& constraint) {
+  LinearizedFrame& linear = constraint.linear;
+  const std::uint32_t set = problem_.sets[static_cast<std::size_t>(constraint.frame)];
+  if (set == 0) return;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  forEachPoint(set, [&](Index point) {
+    centre += linear.points.col(point) / double(__builtin_popcount(set));
+  });
+  forEachPoint(set, [&](Index point) {
+    const Eigen::Vector3d inward = centre - linear.points.col(point);
+    const double size = inward.head<2>().norm();
+    if (size > 0.)
+      linear.points.col(point) += std::min(settings_.support_margin / size, 1.) * inward;
+  });
+  projection_.setAnswer(constraint.answer);
+  findResidual(projection_, linear, mu_, set);
+  constraint.answer = projection_.answer();
+  auto& derivative = linear.own(constraint.frame).derivative;
+  forEachPoint(set, [&](Index point) {
+    const Eigen::Vector3d force = projection_.force(int(point));
+    const Eigen::Matrix3Xd of_lever =
+        linear.of_points[static_cast<std::size_t>(point)] - linear.of_com;
+    for (Index k = 0; k < of_lever.cols(); ++k)
+      derivative.col(k).tail<3>() += force.cross(Eigen::Vector3d(of_lever.col(k)));
+  });
+}
+
+double WholeBodyWindow::weigh(const Constraint& constraint) const {
+  if (problem_.free[constraint.frame]) return 0.;
+  const bool flies = problem_.sets[static_cast<std::size_t>(constraint.frame)] == 0;
+  return differ(constraint.frame).duration * penalty_ * (flies ? kFlight : 1.);
+}
+
+// The second derivative of the augmented Lagrangian.
+bool WholeBodyWindow::factorize(double penalty) {
+  penalty_ = penalty;
+  const Index last = problem_.time.size() - 1;
+  std::vector<Index> first;
+  for (Index frame = first_; frame < behind_; ++frame) {
+    // Both ends of the motion reach three frames far.
+    const Index band = frame == 3 || frame == last ? 3 : 2;
+    first.push_back(std::max<Index>(frame - band, first_) - first_);
+  }
+  system_.resize(problem_.model.nv, first);
+  const auto block = [&](Index row, Index column) {
+    return system_(row - first_, column - first_);
+  };
+  for (Index frame = std::max<Index>(first_ - 1, 0); frame <= std::min(behind_, last); ++frame) {
+    const Difference difference = differ(frame);
+    const double factors[3] = {difference.before, difference.here, difference.after};
+    if (isSought(frame)) block(frame, frame).diagonal() += difference.duration * problem_.of_change;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j <= i; ++j)
+        if (isSought(frame - 1 + i) && isSought(frame - 1 + j))
+          block(frame - 1 + i, frame - 1 + j).diagonal() +=
+              difference.duration * factors[i] * factors[j] * problem_.of_acceleration;
+  }
+  const double hold = 1. / (settings_.held_point * settings_.held_point);
+  for (const Constraint& constraint : constraints_) {
+    const Index frame = constraint.frame;
+    if (isSought(frame))
+      forEachPoint(problem_.sets[static_cast<std::size_t>(frame)], [&](Index point) {
+        const auto& derivative = constraint.linear.of_points[static_cast<std::size_t>(point)];
+        block(frame, frame).noalias() +=
+            differ(frame).duration * hold * derivative.transpose() * derivative;
+      });
+    const double weight = weigh(constraint);
+    const auto& terms = constraint.linear.terms;
+    for (std::size_t i = 0; i < terms.size(); ++i)
+      for (std::size_t j = 0; j <= i; ++j)
+        if (isSought(terms[i].frame) && isSought(terms[j].frame))
+          block(terms[i].frame, terms[j].frame).noalias() +=
+              weight * terms[i].derivative.transpose() * terms[j].derivative;
+  }
+  return system_.factorize();
+}
+
+// The gradient of what changes cost, to be descended.
+void WholeBodyWindow::addCosts(const Eigen::MatrixXd& change) {
+  const Index last = problem_.time.size() - 1;
+  for (Index frame = std::max<Index>(first_ - 1, 0); frame <= std::min(behind_, last); ++frame) {
+    const Difference difference = differ(frame);
+    const double factors[3] = {difference.before, difference.here, difference.after};
+    Eigen::VectorXd acceleration = Eigen::VectorXd::Zero(change.rows());
+    for (int i = 0; i < 3; ++i)
+      if (factors[i] != 0.) acceleration += factors[i] * change.col(frame - 1 + i);
+    acceleration = difference.duration * problem_.of_acceleration.cwiseProduct(acceleration);
+    for (int i = 0; i < 3; ++i)
+      if (isSought(frame - 1 + i)) step_.col(frame - 1 + i - first_) -= factors[i] * acceleration;
+    if (isSought(frame))
+      step_.col(frame - first_) -=
+          difference.duration * problem_.of_change.cwiseProduct(change.col(frame));
+  }
+}
+
+// A step of ADMM with the linear model that there is.
+void WholeBodyWindow::iterate(bool with_costs, Eigen::MatrixXd& change) {
+  step_.setZero(problem_.model.nv, behind_ - first_);
+  if (with_costs) addCosts(change);
+  const double hold = 1. / (settings_.held_point * settings_.held_point);
+  for (const Constraint& constraint : constraints_) {
+    const Index frame = constraint.frame;
+    if (isSought(frame))
+      forEachPoint(problem_.sets[static_cast<std::size_t>(frame)], [&](Index point) {
+        step_.col(frame - first_).noalias() -=
+            differ(frame).duration * hold *
+            constraint.linear.of_points[static_cast<std::size_t>(point)].transpose() *
+            constraint.off.col(point);
+      });
+    const Vector6 off = weigh(constraint) * (constraint.moved - constraint.given + constraint.dual);
+    for (const auto& term : constraint.linear.terms)
+      if (isSought(term.frame))
+        step_.col(term.frame - first_).noalias() -= term.derivative.transpose() * off;
+  }
+  system_.solve(step_);
+  change.middleCols(first_, behind_ - first_) += step_;
+  for (Constraint& constraint : constraints_) {
+    for (const auto& term : constraint.linear.terms)
+      if (isSought(term.frame))
+        constraint.moved.noalias() += term.derivative * step_.col(term.frame - first_);
+    if (isSought(constraint.frame))
+      forEachPoint(problem_.sets[static_cast<std::size_t>(constraint.frame)], [&](Index point) {
+        constraint.off.col(point).noalias() +=
+            constraint.linear.of_points[static_cast<std::size_t>(point)] *
+            step_.col(constraint.frame - first_);
+      });
+  }
+}
+
+// The wrenches within the cones that are closest to those of the linear model.
+void WholeBodyWindow::project(bool relaxed) {
+  const double relaxation = relaxed ? kRelaxation : 1.;
+  for (Constraint& constraint : constraints_) {
+    if (problem_.free[constraint.frame]) continue;
+    const Vector6 target =
+        relaxation * constraint.moved + (1. - relaxation) * constraint.given + constraint.dual;
+    constraint.dual = target;
+    const std::uint32_t set = problem_.sets[static_cast<std::size_t>(constraint.frame)];
+    if (set != 0) {
+      const LinearizedFrame& linear = constraint.linear;
+      projection_.setAnswer(constraint.answer);
+      projection_.project(target, linear.points.colwise() - linear.com, mu_, set);
+      constraint.answer = projection_.answer();
+      constraint.dual = projection_.residual();
+    }
+    constraint.given = target - constraint.dual;
+  }
+}
+
+// Begins ADMM with the closest wrenches, without multipliers.
+void WholeBodyWindow::restart() {
+  for (Constraint& constraint : constraints_) {
+    constraint.given = constraint.moved;
+    constraint.dual.setZero();
+  }
+  project(false);
+  for (Constraint& constraint : constraints_) constraint.dual.setZero();
+}
+
+void WholeBodyWindow::apply(const Eigen::MatrixXd& change, Eigen::MatrixXd& q) const {
+  Eigen::VectorXd configuration(problem_.model.nq);
+  for (Index frame = first_; frame < behind_; ++frame) {
+    pinocchio::integrate(problem_.model, problem_.q.col(frame), change.col(frame), configuration);
+    q.col(frame) = configuration;
+  }
+}
+
+}  // namespace dynacom::internal

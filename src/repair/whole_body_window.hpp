@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "../inference/cone_projection.hpp"
+#include "block_band.hpp"
+#include "dynacom/motion_repair.hpp"
+#include "motion_linearization.hpp"
+
+namespace dynacom::internal {
+
+/// What repairMotion() asks.
+struct WholeBodyProblem {
+  const pinocchio::Model& model;
+  std::vector<BodyPoint> points;
+  std::vector<double> mu;  // of each point
+  Eigen::VectorXd time;
+  Eigen::MatrixXd q;                           // before, nq × frames
+  std::vector<std::uint32_t> sets;             // of each frame: a bit for each point that pushes
+  std::vector<Eigen::Matrix3Xd> targets;       // where points are to be that push, 3 × frames each
+  Eigen::Array<bool, Eigen::Dynamic, 1> free;  // frames whose wrench is not asked for
+  Eigen::VectorXd of_change, of_acceleration;  // costs of squares, nv
+};
+
+/// Changes of the configurations, frame after frame, found for some frames at a time.
+class WholeBodyWindow {
+ public:
+  /// @param problem, settings  must outlive this
+  WholeBodyWindow(const WholeBodyProblem& problem, const RepairSettings& settings);
+
+  /// Finds the changes of the frames from `first` to `behind`, excluded; those before stay as they
+  /// are, those behind have none.
+  /// @param change  in the tangent space at the configurations before, nv × frames
+  /// @param q       the configurations that it leads to
+  void solve(Eigen::Index first, Eigen::Index behind, Eigen::MatrixXd& change, Eigen::MatrixXd& q);
+
+ private:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  // δ̈ = before δ₋ + here δ + after δ₊, and how long a frame lasts.
+  struct Difference {
+    double before, here, after, duration;
+  };
+  // A frame whose wrench depends on what is sought.
+  struct Constraint {
+    Eigen::Index frame;
+    LinearizedFrame linear;
+    Eigen::Matrix3Xd off;  // of points from their targets
+    Vector6 moved, given, dual;
+    ConeProjection::Answer answer;
+  };
+
+  Difference differ(Eigen::Index frame) const;
+  bool isSought(Eigen::Index frame) const { return first_ <= frame && frame < behind_; }
+  void begin(Eigen::Index first, Eigen::Index behind);
+  double linearize(const Eigen::MatrixXd& q);
+  void shrink(Constraint& constraint);
+  bool factorize(double penalty);
+  void addCosts(const Eigen::MatrixXd& change);
+  void iterate(bool with_costs, Eigen::MatrixXd& change);
+  void project(bool relaxed);
+  void restart();
+  void apply(const Eigen::MatrixXd& change, Eigen::MatrixXd& q) const;
+  double weigh(const Constraint& constraint) const;
+
+  const WholeBodyProblem& problem_;
+  const RepairSettings& settings_;
+  MotionLinearizer linearizer_;
+  ConeProjection projection_;
+  std::vector<double> mu_;  // shrunk
+  Eigen::Index first_ = 0, behind_ = 0;
+  std::vector<Constraint> constraints_;
+  double penalty_ = 0.;
+  BlockBand<Eigen::Dynamic> system_;
+  Eigen::MatrixXd step_;
+};
+
+/// What points cannot give of a wrench over the weight, by a projection on what they can.
+Eigen::Matrix<double, 6, 1> findResidual(ConeProjection& projection, const LinearizedFrame& linear,
+                                         const std::vector<double>& mu, std::uint32_t set);
+
+}  // namespace dynacom::internal
