@@ -6,7 +6,8 @@ DATA is ../shared/data by default; of its clips those whose names have one of NA
 
 A clip is examined as ever, its filtered configurations are repaired with the contacts that were
 found, and what comes out is examined once more, without a filter, as if it were a file. Where its
-contacts are others then, it is repaired with those, up to ROUNDS times.
+contacts cannot give what every frame needs, it is repaired once more with the contacts that were
+found then, up to ROUNDS times.
 """
 
 import sys
@@ -23,13 +24,6 @@ import dynacom
 ROOT = Path(__file__).parents[1]
 ROUNDS = 3
 DONE = {"Solved", "NoContact"}
-
-
-def split(robot, found):
-    """The parts that an examination was of."""
-    links = {part.name.split(".")[1] for part in found.parts if part.name.startswith("body.")}
-    bodies = [body for body in robot.collision_points.bodies if body.link in links]
-    return dynacom.splitContacts(robot.dynacom(), bodies)
 
 
 def solved(found):
@@ -55,9 +49,8 @@ def repair(clip, robot, settings):
     for _ in range(ROUNDS):
         rounds += 1
         start = time.process_time()
-        repaired = dynacom.repairMotion(
-            split(robot, found), motion, found.inference.schedule, settings
-        )
+        parts = dynacom.splitContacts(robot.dynacom(), found.links)
+        repaired = dynacom.repairMotion(parts, motion, found.inference.schedule, settings)
         spent += time.process_time() - start
         motion = repaired.motion
         written = replace(clip, q=np.asarray(motion.q), v=None, a=None)
@@ -93,7 +86,8 @@ def main():
         try:
             robot = truth_clips.load_robot(sample.robot, Path(data) / "clips")
             clip = dynacom.read_motion(Path(data) / sample.path, robot, **sample.options)
-        except dynacom.DynacomError:
+        except dynacom.DynacomError as error:
+            print(error, file=sys.stderr)
             continue
         for feet in ("moved", "held"):
             settings = dynacom.RepairSettings()

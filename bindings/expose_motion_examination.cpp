@@ -10,6 +10,8 @@ using Examination = MotionExamination;
 
 bp::list getParts(const Examination& examination) { return toList(examination.parts); }
 
+bp::list getLinks(const Examination& examination) { return toList(examination.links); }
+
 bp::object getInferred(const Examination& examination) {
   return examination.inferred ? bp::object(*examination.inferred) : bp::object();
 }
@@ -116,6 +118,9 @@ void exposeMotionExamination() {
       .def_readonly("derived", &Examination::derived, "The DerivedMotion")
       .add_property("contacts", &Elements<&Examination::contacts>::get,
                     "A ContactMotion for each contact, with velocities relative to the ground")
+      .add_property("links", &getLinks,
+                    "The BodyPoints of each link that was looked at, if one carries; parts are\n"
+                    "those of splitContacts with these")
       .add_property("parts", &getParts, "A PartRobot.Part for each part of the contacts")
       .add_property("part_motions", &Elements<&Examination::part_motions>::get,
                     "The same of each of them")

@@ -22,10 +22,10 @@ const char* getMeaning(const std::string& field) {
        "The change of the acceleration of what turns that costs 1 in a second [rad/s^2]"},
       {"friction_margin", "Which part of the friction is left unused"},
       {"support_margin", "How far inside what carries wrenches press [m]"},
-      {"held_point", "What parts that carry are off their places costs 1 if it is this [m]"},
+      {"held_point", "An active part that is so far from its place costs 1 in a second [m]"},
       {"largest_drift", "Contacts that drift by no more than this in a stance are held still [m]"},
-      {"window", "What is longer is repaired in windows of this length [s]"},
-      {"overlap", "Windows take in so much behind them [s]"},
+      {"window", "Longer motions are repaired in windows of this length [s]"},
+      {"overlap", "Windows find so much beyond their end, which the next one finds anew [s]"},
   };
   return all.at(field);
 }
@@ -103,13 +103,14 @@ void exposeMotionRepair() {
        bp::arg("free") = bp::object()),
       "The RepairedMotion: the smallest change d(t) of a motion's configurations after which\n"
       "contacts can give the wrench of each frame, of the derivatives that differentiate()\n"
-      "gives it, and parts that carry are held at their places. Minimises the integral of\n"
-      "|d|^2 and |d''|^2 over the squares of settings, by Gauss-Newton and the alternating\n"
-      "direction method of multipliers. parts: of splitContacts, with a free-flyer as root;\n"
-      "motion: whose time and q are read, four frames at least; schedule: of the parts; free:\n"
-      "(T,), frames of whose wrench nothing is asked. A motion whose wrenches are within reach\n"
-      "comes back as it is. Raises ValueError if settings or the motion are not valid, the\n"
-      "schedule names a part that there is not, or sizes differ.");
+      "gives it. Minimises the integral of |d|^2, |d''|^2 and of how far active parts are from\n"
+      "their places, over the squares of settings, by Gauss-Newton and the alternating direction\n"
+      "method of multipliers; see docs/repair.md. parts: of splitContacts, with a free-flyer as\n"
+      "root; motion: whose time and q are read, four frames at least; schedule: of the parts;\n"
+      "free: (T,), frames of whose wrench nothing is asked. A motion whose wrenches are within\n"
+      "reach comes back as it is. Raises ValueError if settings or the motion are not valid, the\n"
+      "root is another, the schedule names a part that there is not, sizes differ, there are more\n"
+      "than 32 parts, or what a frame needs is too large for numbers.");
 }
 
 }  // namespace dynacom::python

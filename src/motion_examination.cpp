@@ -378,6 +378,7 @@ class MotionExaminer::Workspace::Pipeline {
     const Eigen::Index given = missing.count() - lacks(*links_, other).count();
     if (given > 0 && double(given) >= kLeastGain * double(missing.count())) {
       split_ = &*links_;
+      screened_ = bodies;
       return other;
     }
     link_sweep_.reset();
@@ -508,6 +509,7 @@ class MotionExaminer::Workspace::Pipeline {
       found.schedule.confidence = findRecordedConfidence(found.schedule.names, *recorded_.schedule);
     found.bodies = internal::gatherBodies(*split_, schedule);
     found.parts = split_->parts;
+    found.links = screened_;
     if (found.inferred)
       found.disagreement = findDisagreement(found.schedule.active, found.inferred->active);
     found.ground = findGround(swept.contacts, found.parts, swept.parts, found.inference.ground);
@@ -550,6 +552,7 @@ class MotionExaminer::Workspace::Pipeline {
   Mask near_jumps_;
   const ContactSplit* split_ = &workspace_.split;  // what carries: the contacts, or
   std::optional<ContactSplit> links_;              // those with links besides,
+  std::vector<BodyPoints> screened_;               // these links, if they carry,
   std::optional<ContactSplit> tilted_;             // and on slopes these, along their normals,
   std::vector<bool> tilts_;                        // as far as they have the ground's
   std::optional<internal::MotionSweep> link_sweep_;

@@ -74,8 +74,9 @@ void markUnsure(const pinocchio::Model& model, pinocchio::Data& data, bool is_fi
     const Eigen::Index frame = is_first ? away : last - away;
     const CentroidalState state = computeCentroidalState(model, data, motion.q.col(frame),
                                                          motion.v.col(frame), motion.a.col(frame));
-    const double weight = state.mass * internal::kStandardGravity;
-    force += (state.acom / internal::kStandardGravity).squaredNorm() / double(kSamples);
+    const double gravity = internal::findUnitGravity(model.gravity.linear());
+    const double weight = state.mass * gravity;
+    force += (state.acom / gravity).squaredNorm() / double(kSamples);
     torque += (state.amVariation / weight).squaredNorm() / double(kSamples);
   }
   if (std::sqrt(force) <= kUnsureForce && std::sqrt(torque) <= kUnsureTorque) return;
@@ -140,10 +141,10 @@ DerivedMotion internal::rederiveMotion(const Derivation& derivation, const Recor
   internal::requireSize("q", recorded.q.rows(), Eigen::Index(model.nq), "components (nq)");
   internal::requireSize("q", recorded.q.cols(), recorded.time.size(), "frames");
   requireConfigurations(model, recorded.q, recorded.time.size());
+  if (!std::isnan(cutoff) && !(cutoff >= 0. && std::isfinite(cutoff)))
+    throwInvalid("cutoff must be finite and >= 0 Hz, got ", cutoff);
   estimateNoise(derivation, time, recorded.q, derived);
   if (std::isnan(cutoff)) cutoff = derived.is_automatic ? chooseCutoff(derived) : 0.;
-  if (!(cutoff >= 0.) || !std::isfinite(cutoff))
-    throwInvalid("cutoff must be finite and >= 0 Hz, got ", cutoff);
   if (cutoff > 0. && recorded.time.size() > 1) {
     if (!is_even)
       throwInvalid("times must be evenly spaced to be filtered, got steps from ",
@@ -185,7 +186,9 @@ DerivedMotion internal::deriveMotion(const Derivation& derivation, const Recorde
       derived.is_recorded = true;
       derived.mismatch = mismatch;
       derived.frame_rate = findFrameRate(recorded.time);
-      estimateNoise(derivation, recorded.time, recorded.q, derived);
+      const bool is_even = !std::isnan(derived.frame_rate);
+      estimateNoise(derivation, is_even ? makeEven(recorded.time) : recorded.time, recorded.q,
+                    derived);
       derived.unsure.setConstant(recorded.time.size(), false);
       return derived;
     }

@@ -88,6 +88,19 @@ BOOST_AUTO_TEST_CASE(wrenches_are_those_of_the_derivatives_of_differentiate) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(what_slides_is_told_from_what_turns) {
+  pinocchio::Model model = singleBody(1., {});
+  pinocchio::JointModelComposite both{pinocchio::JointModelRX()};
+  both.addJoint(pinocchio::JointModelPZ());
+  model.addJoint(1, pinocchio::JointModelPlanar(), SE3::Identity(), "planar");
+  model.addJoint(1, pinocchio::JointModelTranslation(), SE3::Identity(), "translation");
+  model.addJoint(1, pinocchio::JointModelPY(), SE3::Identity(), "slide");
+  model.addJoint(1, both, SE3::Identity(), "both");
+  Eigen::Array<bool, Eigen::Dynamic, 1> expected(6 + 3 + 3 + 1 + 2);
+  expected << 1, 1, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1;
+  BOOST_TEST((internal::findSliding(model) == expected).all());
+}
+
 BOOST_AUTO_TEST_CASE(derivatives_are_those_of_finite_differences) {
   Random random(2);
   const double size = 1e-5;

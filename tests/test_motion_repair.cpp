@@ -85,7 +85,7 @@ BOOST_AUTO_TEST_CASE(what_contacts_can_give_comes_back_as_it_is) {
   BOOST_TEST(repaired.root_rms == 0.);
   BOOST_TEST(repaired.stances.size() == 2u);
   for (const RepairedStance& stance : repaired.stances) {
-    BOOST_TEST(stance.is_still);
+    BOOST_TEST(!stance.is_still);  // nothing was done about it
     BOOST_TEST(stance.first == 0);
     BOOST_TEST(stance.behind == 40);
   }
@@ -195,12 +195,25 @@ BOOST_AUTO_TEST_CASE(a_mirrored_motion_is_repaired_to_a_mirrored_one) {
 BOOST_AUTO_TEST_CASE(nothing_is_asked_of_frames_that_are_free) {
   const Walker walker;
   const Motion motion = walker.sway(100);
+  const ContactSchedule schedule = walker.schedule(100);
   Eigen::Array<bool, Eigen::Dynamic, 1> free(100);
   free.setConstant(true);
-  const RepairedMotion repaired =
-      repairMotion(*walker.split, motion, walker.schedule(100), {}, free);
-  BOOST_TEST(repaired.within_reach);
-  BOOST_TEST((repaired.motion.q == motion.q));
+  const RepairedMotion untouched = repairMotion(*walker.split, motion, schedule, {}, free);
+  BOOST_TEST(untouched.within_reach);
+  BOOST_TEST((untouched.motion.q == motion.q));
+  // Half of them: the other half is mended, with less of a change.
+  free.tail(50).setConstant(false);
+  const RepairedMotion half = repairMotion(*walker.split, motion, schedule, {}, free);
+  BOOST_TEST(half.within_reach);
+  const MotionAnalysis analysis = analyzeMotion(walker.split->robot, half.motion, schedule);
+  Index unsolved = 0;
+  for (std::size_t frame = 0; frame < 100; ++frame) {
+    const bool solved = analysis.status[frame] == DistributionStatus::Solved;
+    if (!solved) ++unsolved;
+    BOOST_TEST((solved || free[Index(frame)]));
+  }
+  BOOST_TEST(unsolved > 5);
+  BOOST_TEST(half.root_rms < repairMotion(*walker.split, motion, schedule).root_rms);
 }
 
 BOOST_AUTO_TEST_CASE(mistakes_are_named) {
@@ -219,6 +232,14 @@ BOOST_AUTO_TEST_CASE(mistakes_are_named) {
       [&] { repairMotion(*walker.split, walker.stand(3), walker.schedule(3)); }, {"4", "3"}));
   BOOST_TEST(throws<std::invalid_argument>(
       [&] { repairMotion(*walker.split, motion, walker.schedule(9)); }, {"9", "10"}));
+  Motion fast = walker.sway(10);
+  fast.q(0, 5) = 1e200;
+  BOOST_TEST(throws<std::invalid_argument>([&] { repairMotion(*walker.split, fast, schedule); },
+                                           {"frame", "too large"}));
+  ContactSchedule strange = schedule;
+  strange.names[0] = "nose";
+  BOOST_TEST(throws<std::invalid_argument>([&] { repairMotion(*walker.split, motion, strange); },
+                                           {"nose", "part"}));
   Motion wrong = motion;
   wrong.q(0, 5) = std::numeric_limits<double>::quiet_NaN();
   BOOST_TEST(

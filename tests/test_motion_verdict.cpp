@@ -303,7 +303,17 @@ BOOST_AUTO_TEST_CASE(windows_neither_begin_nor_end_where_nothing_is_known) {
   BOOST_TEST(verdict.windows[0].first == 30);
   BOOST_TEST(verdict.windows[0].last == 94);
   BOOST_TEST(verdict.feasible_share == 0.65);
+  // Nor with an interruption beside what is not known.
+  stand.ground.setZero(2, 100);
+  stand.ground.middleCols(31, 2).setConstant(0.1);
+  stand.settings.ground_penetration.allowed_share = 1.;
+  BOOST_REQUIRE(stand.judge().windows.size() == 1u);
+  BOOST_TEST(stand.judge().windows[0].first == 33);
+  stand.ground.setZero(2, 1);
+  stand.settings.minimal_window = 0.;
   stand.unsure.setConstant(true);
+  BOOST_TEST(stand.judge().windows.empty());
+  stand.settings.minimal_window = 0.2;
   stand.unsure.segment(50, 10).setConstant(false);
   BOOST_TEST(stand.judge().windows.empty());
 }

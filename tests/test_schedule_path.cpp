@@ -64,12 +64,12 @@ struct Problem {
     }
   }
 
-  SchedulePath find(const KnownContacts* known = nullptr) const {
+  SchedulePath find(const KnownContacts* known = nullptr, const PathPieces& pieces = {}) const {
     std::vector<PointTrack> points;
     for (std::size_t k = 0; k < limbs.size(); ++k)
       points.push_back({limbs[k], mu[k], false, position[k], velocity[k]});
     return findSchedulePath(points, rests, scales, {com, force, torque}, kWeight, time, settings,
-                            known);
+                            known, pieces);
   }
 
   std::vector<int> limbs;
@@ -366,6 +366,21 @@ BOOST_AUTO_TEST_CASE(levels_that_are_left_out_of_many_are_none_twice) {
   for (const Index last : {2, 5, 8, 11, 14}) {  // of a foot, active only if all its points are
     BOOST_TEST(found.probability(last, 0) < all / (1. + all) + 1e-4);
     BOOST_TEST(found.probability(last, 0) > 0.3);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(long_motions_are_looked_at_piece_by_piece) {
+  Random random(7);
+  for (int trial = 0; trial < 10; ++trial) {
+    Problem problem(random, {0, 0, 1, 1}, 400);
+    const SchedulePath whole = problem.find();
+    const SchedulePath pieces = problem.find(nullptr, {60, 40});
+    BOOST_TEST((pieces.sets == whole.sets));
+    BOOST_TEST(close(pieces.missing, whole.missing));
+    // Where a piece begins, it is sure of the frame before.
+    const MatrixXd off = (pieces.probability - whole.probability).cwiseAbs();
+    BOOST_TEST(off.mean() < 0.01);
+    BOOST_TEST(off.maxCoeff() > 0.);
   }
 }
 

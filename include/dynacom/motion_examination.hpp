@@ -63,8 +63,8 @@ struct MotionExamination {
   DerivedMotion derived;
   std::vector<ContactMotion> contacts;  ///< computeContactMotions(); velocities are relative to the
                                         ///< ground, which may be a treadmill
-  /// splitContacts(), with the links that were looked at, if one of them carries.
-  std::vector<PartRobot::Part> parts;
+  std::vector<BodyPoints> links;  ///< those that were looked at, with their points, if one carries
+  std::vector<PartRobot::Part> parts;       ///< of splitContacts() with these
   std::vector<ContactMotion> part_motions;  ///< the same of the parts
   /// inferContacts(): of the parts, within the contacts that are recorded, if there are any.
   ContactInference inference;

@@ -22,12 +22,13 @@ struct DYNACOM_EXPORT RepairSettings {
   /// By which part friction is left unused, and how far inside what carries wrenches press [m], so
   /// that a motion that is written and read again is still feasible.
   double friction_margin = 0.02, support_margin = 0.001;
-  /// What parts that carry are off their places costs 1 in a second if it is this [m].
+  /// An active part that is so far from its place costs 1 in a second [m].
   double held_point = 0.0005;
   /// A contact that moves by no more than this in a stance stands still in it, where it is on
   /// average; one that drifts by more moves as it did [m].
   double largest_drift = 0.02;
-  /// What is longer is repaired in windows of this length, each with so much behind it [s].
+  /// Longer motions are repaired in windows of this length; each also finds so much beyond its end,
+  /// which the next one finds anew [s].
   double window = 10., overlap = 2.;
 
   using Field = std::pair<const char*, double RepairSettings::*>;
@@ -49,7 +50,7 @@ struct RepairedStance {
   std::size_t contact;         ///< whose parts these are: PartRobot::Part::contact
   Eigen::Index first, behind;  ///< frames
   double drift;   ///< largest distance of a part from where it is on average, before [m]
-  bool is_still;  ///< whether it was held still
+  bool is_still;  ///< whether it was held still; not where the motion stays as it is
 };
 
 /// A motion whose contacts can give what it needs, near another one.
@@ -62,7 +63,7 @@ struct DYNACOM_EXPORT RepairedMotion {
   std::vector<RepairedStance> stances;
   double root_rms = 0., root_largest = 0.;    ///< of the root's displacement [m]
   double joint_rms = 0., joint_largest = 0.;  ///< of the changes of joints that turn [rad]
-  double held_largest = 0.;  ///< distance of a part that carries from its place [m]
+  double held_largest = 0.;  ///< distance of an active part from its place, if any is held [m]
   /// Whether all wrenches are within reach, but for 1e-6 of the weight.
   bool within_reach = true;
 };
@@ -70,24 +71,27 @@ struct DYNACOM_EXPORT RepairedMotion {
 /// Finds the smallest change of a motion after which its contacts can give what it needs: changes
 /// d_t of the configurations that minimise
 ///
-///     ∫ ‖d‖²/σ_d² + ‖d̈‖²/σ_a² dt
+///     ∫ ‖d‖²/σ_d² + ‖d̈‖²/σ_a² + Σ ‖p_k − p̄_k‖²/σ_p² dt
 ///
 /// while the wrench of each frame, of the velocities and accelerations that differentiate() gives
-/// it, is within what its contacts can give where they are then. Parts that carry are held at their
-/// places. Gauss–Newton over the whole motion: wrenches are linearised by the derivatives of the
+/// it, is within what its contacts can give where they are then. The sum is over the active parts,
+/// whose places are p_k: p̄_k is where a contact stands still that drifts by little, else where the
+/// part was. Gauss–Newton over the whole motion: wrenches are linearised by the derivatives of the
 /// centroidal dynamics (Carpentier and Mansard, Analytical Derivatives of Rigid Body Dynamics
-/// Algorithms, 2018), and split from the changes as in distanceToFeasible(); a last step takes the
-/// nearest motion within all cones, without costs. What takes place in frames of which nothing is
-/// asked, or has no feasible motion nearby, shows in the residual.
+/// Algorithms, 2018), and split from the changes as in distanceToFeasible(); last steps take the
+/// nearest motion within all cones, of whose costs only the sum counts. What takes place in frames
+/// of which nothing is asked, or has no feasible motion nearby, shows in the residual.
 ///
-/// A motion whose wrenches are all within reach comes back as it is, bit for bit.
+/// A motion whose wrenches are all within reach comes back as it is, bit for bit, and its contacts
+/// drift as they did.
 /// @param parts     whose contacts are points, of splitContacts(); the root must be a free-flyer
 /// @param motion    whose time and configurations are read; four frames at least
 /// @param schedule  of the parts, by their names; without schedule a part never carries
 /// @param settings  costs and margins
 /// @param free      frames of whose wrench nothing is asked; empty if there are none
 /// @throws std::invalid_argument if settings or the motion are not valid, the root is another, the
-///         schedule names a part that there is not, sizes differ, or there are more than 32 parts
+///         schedule names a part that there is not, sizes differ, there are more than 32 parts, or
+///         what a frame needs is too large for numbers
 DYNACOM_EXPORT RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
                                            const ContactSchedule& schedule,
                                            const RepairSettings& settings = {},

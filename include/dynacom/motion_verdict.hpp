@@ -106,7 +106,8 @@ struct DYNACOM_EXPORT VerdictSettings {
   /// three joints mixed up 16, a robot that leans 5 cm too far 50.
   double repairable_distance = 0.01, repairable_largest_distance = 0.05;
   /// Nor is one whose contacts are deeper below their ground than this, if that is a fault, or
-  /// slide by more than the second in a row of frames that are beyond the limit, > 0 [m]. The toes
+  /// slide by more than the second, the fastest of them at each moment, in a row of frames that are
+  /// beyond the limit, > 0 [m]. The toes
   /// of people who push off seem to be 6 cm deep where they were measured by markers; feet of
   /// retargeted dances slide by 12 to 26 cm, and what slides farther makes a step.
   double repairable_depth = 0.07, repairable_slide = 0.3;
@@ -174,8 +175,7 @@ struct DYNACOM_EXPORT MotionVerdict {
   const MotionFinding& operator[](MotionFault fault) const;
   /// Lets NotFeasible be Repairable, where only mendable faults hold, and the distance to feasible
   /// and what contacts sink and slide are within what settings allow.
-  /// @param distance  of distanceToFeasible(); without it, where it did not converge, nothing
-  /// changes
+  /// @param distance  of distanceToFeasible(); where that did not converge, nothing changes
   /// @param time      of the frames [s]
   void weighDistance(const CentroidalChange& distance, const Eigen::VectorXd& time,
                      const VerdictSettings& settings);

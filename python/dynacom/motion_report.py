@@ -51,6 +51,9 @@ _XY = ("_x", "_y")
 _WRENCH = tuple(f"_{part}{axis}" for part in ("force", "torque") for axis in _XYZ)
 _WRENCH_UNITS = ("N", "N", "N", "N m", "N m", "N m")
 
+#: What may be wrong with a motion: code -> unit of what is measured, and what it means.
+FAULTS: dict[str, tuple[str, str]] = describeFaults()
+
 # Of the table: array's name, what its columns' names end with, their units. docs/columns.md says
 # what they are.
 _FRAME_COLUMNS = (
@@ -69,6 +72,7 @@ _FRAME_COLUMNS = (
     ("status", ("",), ""),
     ("judged", ("",), ""),
     ("fault", ("",), ""),
+    *((f"fault.{code}", ("",), unit) for code, (unit, _) in FAULTS.items()),
     ("residual", _WRENCH, _WRENCH_UNITS),
     ("feasible_acom", _XYZ, "m/s^2"),
     ("feasible_dam", _XYZ, "N m"),
@@ -110,8 +114,6 @@ _BODY_COLUMNS = (
 # Where the file says what the contacts felt.
 _MEASURED_COLUMNS = (("measured_force", _XYZ, "N"), ("measured_torque", _XYZ, "N m"))
 
-#: What may be wrong with a motion: code -> unit of its worst value, and what it means.
-FAULTS: dict[str, tuple[str, str]] = describeFaults()
 #: What the code ``too_short`` means, for which a motion is unknown.
 TOO_SHORT = "there are too few frames whose accelerations are known"
 
@@ -621,6 +623,8 @@ def _collect_arrays(
     arrays["status"] = np.array([status.name for status in analysis.status])
     arrays["judged"] = ~np.asarray(found.verdict.unsure, dtype=bool)
     arrays["fault"] = _faults_by_frame(found.verdict, options)
+    for code, finding in found.verdict.findings.items():
+        arrays[f"fault.{code}"] = finding.measured
     names = [name for name, _, _ in _FRAME_COLUMNS if name not in arrays]
     arrays |= {name: getattr(analysis, name) for name in names}
     confidence = found.schedule.confidence

@@ -29,9 +29,6 @@ constexpr float kNegligible = 0.05f;
 constexpr float kProbable = 0.005f;
 // Costs that are larger by this make a set improbable.
 constexpr float kImprobable = 6.f;
-// How many frames are looked at together at most, and how many of these are looked at again with
-// the next ones.
-constexpr Index kLongest = 8000, kOverlap = 1000;
 // The most that what a set is missing costs: next to what is infinite, nothing else would count.
 constexpr float kLargestCost = 1e5f;
 
@@ -129,7 +126,7 @@ class PathFinder {
   PathFinder(const std::vector<PointTrack>& points, const std::vector<Rests>& rests,
              const CostScales& scales, const WrenchTrack& wrench, double weight,
              const Eigen::VectorXd& time, const DetectionSettings& settings,
-             const KnownContacts* known)
+             const KnownContacts* known, const PathPieces& pieces)
       : points_(points),
         rests_(rests),
         scales_(scales),
@@ -138,6 +135,7 @@ class PathFinder {
         time_(time),
         settings_(settings),
         known_(known),
+        pieces_(pieces),
         changes_(settings.change, settings.further_points),
         projection_(settings.lever) {
     int limbs = 0;
@@ -169,9 +167,10 @@ class PathFinder {
       }
       Index behind = first;
       while (behind < frames && !certain[static_cast<std::size_t>(behind)]) ++behind;
-      // A frame does not depend on others that are far away: what is long is taken bit by bit.
-      for (; behind - first > kLongest + kOverlap; first += kLongest)
-        findBetween(first, first + kLongest + kOverlap);
+      // A frame does not depend on others that are far away: what is long is taken piece by piece,
+      // each from the last frame of the one before on, which is then certain.
+      for (; behind - first > pieces_.longest + pieces_.overlap; first += pieces_.longest)
+        findBetween(first, first + pieces_.longest + pieces_.overlap);
       findBetween(first, behind);
       first = behind - 1;
     }
@@ -199,7 +198,7 @@ class PathFinder {
   void makeSets(Index frame, FrameSets& sets);
   static void combineLevels(FrameSets& sets);
   Eigen::Vector2d findMissing(Index frame, Mask set);
-  // Gives back the memory of what sets are missing in a frame, of which nobody asks again.
+  // Gives back the memory of what sets are missing in a frame, of which hardly anybody asks again.
   void forget(Index frame) { Projections().swap(projected_[static_cast<std::size_t>(frame)]); }
   float costOf(const Eigen::Vector2d& missing, Index frame) const;
   float leastCostOf(const Eigen::Vector2d& missing, Index frame) const;
@@ -230,6 +229,7 @@ class PathFinder {
   const Eigen::VectorXd& time_;
   const DetectionSettings& settings_;
   const KnownContacts* const known_;
+  const PathPieces pieces_;
   const Changes changes_;
   std::vector<double> mu_;
   std::vector<std::vector<int>> limbs_;  // points of each
@@ -732,8 +732,9 @@ bool PathFinder::findProbability(Index first, Index behind) {
 SchedulePath findSchedulePath(const std::vector<PointTrack>& points,
                               const std::vector<Rests>& rests, const CostScales& scales,
                               const WrenchTrack& wrench, double weight, const Eigen::VectorXd& time,
-                              const DetectionSettings& settings, const KnownContacts* known) {
-  return PathFinder(points, rests, scales, wrench, weight, time, settings, known).find();
+                              const DetectionSettings& settings, const KnownContacts* known,
+                              const PathPieces& pieces) {
+  return PathFinder(points, rests, scales, wrench, weight, time, settings, known, pieces).find();
 }
 
 }  // namespace dynacom::internal

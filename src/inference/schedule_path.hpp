@@ -22,6 +22,12 @@ struct SchedulePath {
   Eigen::Matrix2Xd missing;         ///< what they cannot give: norms of force [m g], moment [m g m]
 };
 
+/// How many frames are looked at together at most, and how many of these once more with the next
+/// ones: memory is needed for so many, where contacts are never certain.
+struct PathPieces {
+  Eigen::Index longest = 8000, overlap = 1000;
+};
+
 /// Finds the sets of active points through time that cost least: what where they are costs, what
 /// they cannot give of the wrench, and what changes cost. By dynamic programming (Viterbi), over
 /// sets that take of each limb its cheapest points; what sets cannot give is computed only where a
@@ -32,6 +38,6 @@ SchedulePath findSchedulePath(const std::vector<PointTrack>& points,
                               const std::vector<Rests>& rests, const CostScales& scales,
                               const WrenchTrack& wrench, double weight, const Eigen::VectorXd& time,
                               const DetectionSettings& settings,
-                              const KnownContacts* known = nullptr);
+                              const KnownContacts* known = nullptr, const PathPieces& pieces = {});
 
 }  // namespace dynacom::internal

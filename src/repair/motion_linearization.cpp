@@ -16,6 +16,12 @@ namespace dynacom::internal {
 
 using Eigen::Index;
 
+Eigen::Array<bool, Eigen::Dynamic, 1> findSliding(const pinocchio::Model& model) {
+  pinocchio::Data data(model);
+  pinocchio::computeJointJacobians(model, data, pinocchio::neutral(model));
+  return data.J.bottomRows<3>().colwise().norm().transpose().array() < 1e-9;
+}
+
 LinearizedFrame::Term& LinearizedFrame::own(Index frame) {
   return *std::find_if(terms.begin(), terms.end(),
                        [&](const Term& term) { return term.frame == frame; });

@@ -34,6 +34,9 @@ struct LinearizedFrame {
   Term& own(Eigen::Index frame);
 };
 
+/// Whether each component of a model's velocities displaces, and turns nothing.
+Eigen::Array<bool, Eigen::Dynamic, 1> findSliding(const pinocchio::Model& model);
+
 /// Linearizes motions whose velocities and accelerations are those of differentiate().
 class MotionLinearizer {
  public:

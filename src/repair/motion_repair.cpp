@@ -81,11 +81,9 @@ std::vector<BodyPoint> listPoints(const internal::ContactSplit& parts) {
 
 // Costs of the squares of changes, or of their accelerations, in the tangent space.
 Eigen::VectorXd listCosts(const pinocchio::Model& model, double linear, double angular) {
-  Eigen::VectorXd scale = Eigen::VectorXd::Constant(model.nv, angular);
-  scale.head<3>().setConstant(linear);
-  for (std::size_t joint = 2; joint < model.joints.size(); ++joint)
-    if (model.joints[joint].shortname().rfind("JointModelP", 0) == 0)  // it slides
-      scale.segment(model.joints[joint].idx_v(), model.joints[joint].nv()).setConstant(linear);
+  const Eigen::Index nv = model.nv;
+  const Eigen::VectorXd scale = internal::findSliding(model).select(
+      Eigen::VectorXd::Constant(nv, linear), Eigen::VectorXd::Constant(nv, angular));
   return scale.array().square().inverse();
 }
 
@@ -202,6 +200,8 @@ double measure(const WholeBodyProblem& problem, const Eigen::MatrixXd& q, Repair
       found.held_largest = std::max(found.held_largest, off.norm());
     }
     if (problem.free[frame]) continue;
+    if (!linear.wrench.allFinite())
+      internal::throwInvalid("motion: what frame ", frame, " needs is too large for numbers");
     found.residual.col(frame) = findResidual(projection, linear, problem.mu, set);
     worst = std::max(worst, found.residual.col(frame).norm());
   }
@@ -223,8 +223,8 @@ void repairInWindows(const WholeBodyProblem& problem, const RepairSettings& sett
     if (time.size() - behind < 4) behind = time.size();
     window.solve(first, behind, change, q);
     if (behind == time.size()) return;
-    change.rightCols(time.size() - end).setZero();
-    q.rightCols(time.size() - end) = problem.q.rightCols(time.size() - end);
+    change.middleCols(end, behind - end).setZero();
+    q.middleCols(end, behind - end) = problem.q.middleCols(end, behind - end);
     first = std::max(end, first + 1);
   }
 }
@@ -233,10 +233,17 @@ void summarize(const pinocchio::Model& model, RepairedMotion& found) {
   const auto root = found.change.topRows<3>().colwise().norm();
   found.root_rms = std::sqrt(root.squaredNorm() / double(found.change.cols()));
   found.root_largest = root.maxCoeff();
-  const auto joints = found.change.bottomRows(model.nv - 6);
-  if (joints.size() == 0) return;
-  found.joint_rms = std::sqrt(joints.squaredNorm() / double(joints.size()));
-  found.joint_largest = joints.cwiseAbs().maxCoeff();
+  const auto slides = internal::findSliding(model);
+  double sum = 0.;
+  Index joints = 0;
+  for (Index row = 6; row < model.nv; ++row) {
+    if (slides[row]) continue;
+    ++joints;
+    sum += found.change.row(row).squaredNorm() / double(found.change.cols());
+    found.joint_largest =
+        std::max(found.joint_largest, found.change.row(row).cwiseAbs().maxCoeff());
+  }
+  if (joints > 0) found.joint_rms = std::sqrt(sum / double(joints));
 }
 
 }  // namespace
@@ -278,6 +285,9 @@ RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
   if (worst > kReach) {
     repairInWindows(problem, settings, found.change, q);
     worst = measure(problem, q, found);
+  } else {
+    for (RepairedStance& stance : found.stances) stance.is_still = false;
+    found.held_largest = 0.;
   }
   found.within_reach = worst <= kReach;
   found.residual *= split.carrier.mass * internal::findUnitGravity(split.carrier.gravity);

@@ -21,7 +21,7 @@ constexpr int kRounds = 2, kIterations = 12;
 constexpr double kPolish = 100.;
 constexpr int kPolishes = 8, kPolishIterations = 4;
 // What is missing after that is rounding [m g, m g·m].
-constexpr double kReached = 1e-8;
+constexpr double kReached = 1e-7;
 // Moments count as forces with this lever [m].
 constexpr double kLever = 1.;
 
@@ -76,7 +76,10 @@ void WholeBodyWindow::begin(Index first, Index behind) {
   behind_ = behind;
   constraints_.clear();
   const Index frames = problem_.time.size();
-  for (Index frame = 0; frame < frames; ++frame) {
+  // No wrench depends on frames that are farther away.
+  constexpr Index kReach = 3;
+  for (Index frame = std::max<Index>(first - kReach, 0); frame < std::min(behind + kReach, frames);
+       ++frame) {
     const auto [low, high] = MotionLinearizer::findReach(frame, frames);
     if (high < first || low >= behind) continue;
     Constraint& constraint = constraints_.emplace_back();

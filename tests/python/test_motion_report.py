@@ -164,6 +164,10 @@ def test_arrays_are_those_of_the_steps_by_hand(talos, walk, flat):
         expected |= {f"contact.{contact.name}.{name}": value for name, value in values.items()}
     expected["fault"] = [""] * len(walk.time)
     expected["judged"] = [True] * len(walk.time)
+    recorded = dynacom.RecordedMotion(walk.time, walk.q)
+    verdict = dynacom.judgeMotion(split.robot, motion, recorded, corners, inference.ground, parts)
+    for code, finding in verdict.findings.items():
+        expected[f"fault.{code}"] = finding.measured
     change = dynacom.distanceToFeasible(split, corners, parts, inference.schedule)
     expected["distance"] = np.linalg.norm(change.com, axis=1)
     expected["feasible_com"] = analysis.com + change.com
@@ -174,8 +178,6 @@ def test_arrays_are_those_of_the_steps_by_hand(talos, walk, flat):
         else:
             assert_array_equal(report[name], values, name)
     assert report.summary["omega"] == 3.1
-    recorded = dynacom.RecordedMotion(walk.time, walk.q)
-    verdict = dynacom.judgeMotion(split.robot, motion, recorded, corners, inference.ground, parts)
     assert repr(report.verdict.findings) == repr(verdict.findings)
 
 
