@@ -371,6 +371,7 @@ BOOST_AUTO_TEST_CASE(levels_that_are_left_out_of_many_are_none_twice) {
 
 BOOST_AUTO_TEST_CASE(long_motions_are_looked_at_piece_by_piece) {
   Random random(7);
+  double largest = 0.;
   for (int trial = 0; trial < 10; ++trial) {
     Problem problem(random, {0, 0, 1, 1}, 400);
     const SchedulePath whole = problem.find();
@@ -380,8 +381,9 @@ BOOST_AUTO_TEST_CASE(long_motions_are_looked_at_piece_by_piece) {
     // Where a piece begins, it is sure of the frame before.
     const MatrixXd off = (pieces.probability - whole.probability).cwiseAbs();
     BOOST_TEST(off.mean() < 0.01);
-    BOOST_TEST(off.maxCoeff() > 0.);
+    largest = std::max(largest, off.maxCoeff());
   }
+  BOOST_TEST(largest > 0.);
 }
 
 BOOST_AUTO_TEST_CASE(what_is_not_finite_in_a_frame_ends_there) {
