@@ -93,7 +93,7 @@ void exposeMotionRepair() {
       .def_readonly("held_largest", &RepairedMotion::held_largest,
                     "Largest distance of a part that carries from its place [m]")
       .def_readonly("within_reach", &RepairedMotion::within_reach,
-                    "Whether all wrenches are within reach, but for 1e-6 of the weight")
+                    "Whether all wrenches are within reach, but for 1e-7 of the weight")
       .def(PrintVisitor<RepairedMotion>(&writeMotion))
       .def(CopyVisitor<RepairedMotion>());
 

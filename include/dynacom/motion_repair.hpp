@@ -64,7 +64,7 @@ struct DYNACOM_EXPORT RepairedMotion {
   double root_rms = 0., root_largest = 0.;    ///< of the root's displacement [m]
   double joint_rms = 0., joint_largest = 0.;  ///< of the changes of joints that turn [rad]
   double held_largest = 0.;  ///< distance of an active part from its place, if any is held [m]
-  /// Whether all wrenches are within reach, but for 1e-6 of the weight.
+  /// Whether all wrenches are within reach, but for 1e-7 of the weight.
   bool within_reach = true;
 };
 

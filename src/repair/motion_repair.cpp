@@ -61,9 +61,8 @@ namespace {
 using internal::BodyPoint;
 using internal::WholeBodyProblem;
 
-// Wrenches that lack no more than this part of the weight are within reach: ConeProjection is no
-// more exact.
-constexpr double kReach = 1e-6;
+// Wrenches that lack no more than this part of the weight are within reach.
+constexpr double kReach = 1e-7;
 
 std::vector<BodyPoint> listPoints(const internal::ContactSplit& parts) {
   std::vector<BodyPoint> points;

@@ -20,8 +20,8 @@ constexpr int kRounds = 2, kIterations = 12;
 // Then, costs count no more: the nearest motion within the cones, with a larger penalty.
 constexpr double kPolish = 100.;
 constexpr int kPolishes = 8, kPolishIterations = 4;
-// What is missing after that is rounding [m g, m g·m].
-constexpr double kReached = 1e-7;
+// What is missing after that is rounding [m g, m g·m]: with more, distributions are not Solved.
+constexpr double kReached = 1e-10;
 // Moments count as forces with this lever [m].
 constexpr double kLever = 1.;
 
