@@ -48,6 +48,9 @@ def objects(talos, talos_standing, talos_motion):
     sunk = dynacom.DetectionSettings()
     sunk.ground_height = -1.0  # above it, feet are held in the air
     hovering = dynacom.MotionExaminer(robot, detection=sunk).examine(recorded)
+    repaired = dynacom.repairMotion(
+        dynacom.splitContacts(robot), motion, examination.inference.schedule
+    )
     objects = [
         state,
         dynacom.computeGroundWrench(state, [0.0, 0.0, -9.81]),
@@ -74,6 +77,9 @@ def objects(talos, talos_standing, talos_motion):
         dynacom.VerdictSettings(),
         dynacom.CentroidalFilterSettings(),
         examination.distance,
+        dynacom.RepairSettings(),
+        repaired,
+        repaired.stances[0],
         dynacom.FaultLimit(0.1, 0.2),
         dynacom.AnalysisOptions(),
         dynacom.BatchProgress(3, 1),
