@@ -257,6 +257,10 @@ std::vector<std::string> internal::ContactSplit::nameContacts() const {
   return names;
 }
 
+internal::ContactSplit internal::describeSplit(const PartRobot& parts) {
+  return {parts.parts, parts.bodies, describeCarrier(parts.robot)};
+}
+
 double internal::findBodyFriction(const std::vector<FixedContact>& points) {
   if (points.empty()) return kBodyFriction;
   double least = std::numeric_limits<double>::infinity();

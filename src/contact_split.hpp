@@ -24,6 +24,9 @@ struct ContactSplit {
 /// @throws as splitContacts()
 ContactSplit splitCarrier(const DynaCoM& robot, const std::vector<BodyPoints>& bodies = {});
 
+/// What a PartRobot has of one.
+ContactSplit describeSplit(const PartRobot& parts);
+
 /// The friction of links: the least of some points, which are ContactPoints; 0.7 if there are none.
 double findBodyFriction(const std::vector<FixedContact>& points);
 

@@ -127,9 +127,8 @@ void writeSlopes(const std::vector<PartRobot::Part>& parts,
 ContactInference inferContacts(const PartRobot& parts, const std::vector<ContactMotion>& motions,
                                const MotionAnalysis& dynamics, bool exact,
                                const DetectionSettings& settings, const ContactSchedule* recorded) {
-  return internal::inferContacts(
-      {parts.parts, parts.bodies, internal::describeCarrier(parts.robot)}, motions, dynamics, exact,
-      settings, recorded);
+  return internal::inferContacts(internal::describeSplit(parts), motions, dynamics, exact, settings,
+                                 recorded);
 }
 
 ContactInference internal::inferContacts(const ContactSplit& parts,

@@ -203,9 +203,8 @@ CentroidalChange distanceToFeasible(const PartRobot& parts,
                                     int threads) {
   internal::requireField(threads >= 0, "threads", ">= 0", threads);
   internal::Workers workers(threads);
-  return internal::distanceToFeasible(
-      {parts.parts, parts.bodies, internal::describeCarrier(parts.robot)}, motions, dynamics,
-      schedule, settings, free, workers);
+  return internal::distanceToFeasible(internal::describeSplit(parts), motions, dynamics, schedule,
+                                      settings, free, workers);
 }
 
 }  // namespace dynacom

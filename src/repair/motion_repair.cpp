@@ -260,8 +260,7 @@ RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
     internal::throwInvalid("the root must be a free-flyer to be moved");
   if (free.size() != 0) internal::requireSize("free", free.size(), frames, "frames (or none)");
 
-  const internal::ContactSplit split = {parts.parts, parts.bodies,
-                                        internal::describeCarrier(parts.robot)};
+  const internal::ContactSplit split = internal::describeSplit(parts);
   WholeBodyProblem problem = {
       model,
       {},

@@ -42,7 +42,8 @@ WholeBodyWindow::WholeBodyWindow(const WholeBodyProblem& problem, const RepairSe
     : problem_(problem),
       settings_(settings),
       linearizer_(problem.model, problem.points),
-      projection_(kLever, ConeProjection::kExact) {
+      projection_(kLever, ConeProjection::kExact),
+      hold_(1. / (settings.held_point * settings.held_point)) {
   for (const double mu : problem.mu) mu_.push_back(mu * (1. - settings.friction_margin));
 }
 
@@ -77,9 +78,9 @@ void WholeBodyWindow::begin(Index first, Index behind) {
   constraints_.clear();
   const Index frames = problem_.time.size();
   // No wrench depends on frames that are farther away.
-  constexpr Index kReach = 3;
-  for (Index frame = std::max<Index>(first - kReach, 0); frame < std::min(behind + kReach, frames);
-       ++frame) {
+  constexpr Index kFarthest = 3;
+  for (Index frame = std::max<Index>(first - kFarthest, 0);
+       frame < std::min(behind + kFarthest, frames); ++frame) {
     const auto [low, high] = MotionLinearizer::findReach(frame, frames);
     if (high < first || low >= behind) continue;
     Constraint& constraint = constraints_.emplace_back();
@@ -182,14 +183,13 @@ bool WholeBodyWindow::factorize(double penalty) {
           block(frame - 1 + i, frame - 1 + j).diagonal() +=
               difference.duration * factors[i] * factors[j] * problem_.of_acceleration;
   }
-  const double hold = 1. / (settings_.held_point * settings_.held_point);
   for (const Constraint& constraint : constraints_) {
     const Index frame = constraint.frame;
     if (isSought(frame))
       forEachPoint(problem_.sets[static_cast<std::size_t>(frame)], [&](Index point) {
         const auto& derivative = constraint.linear.of_points[static_cast<std::size_t>(point)];
         block(frame, frame).noalias() +=
-            differ(frame).duration * hold * derivative.transpose() * derivative;
+            differ(frame).duration * hold_ * derivative.transpose() * derivative;
       });
     const double weight = weigh(constraint);
     const auto& terms = constraint.linear.terms;
@@ -224,13 +224,12 @@ void WholeBodyWindow::addCosts(const Eigen::MatrixXd& change) {
 void WholeBodyWindow::iterate(bool with_costs, Eigen::MatrixXd& change) {
   step_.setZero(problem_.model.nv, behind_ - first_);
   if (with_costs) addCosts(change);
-  const double hold = 1. / (settings_.held_point * settings_.held_point);
   for (const Constraint& constraint : constraints_) {
     const Index frame = constraint.frame;
     if (isSought(frame))
       forEachPoint(problem_.sets[static_cast<std::size_t>(frame)], [&](Index point) {
         step_.col(frame - first_).noalias() -=
-            differ(frame).duration * hold *
+            differ(frame).duration * hold_ *
             constraint.linear.of_points[static_cast<std::size_t>(point)].transpose() *
             constraint.off.col(point);
       });

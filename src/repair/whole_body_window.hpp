@@ -69,6 +69,7 @@ class WholeBodyWindow {
   const RepairSettings& settings_;
   MotionLinearizer linearizer_;
   ConeProjection projection_;
+  const double hold_;       // cost of the square of how far a point is from its place
   std::vector<double> mu_;  // shrunk
   Eigen::Index first_ = 0, behind_ = 0;
   std::vector<Constraint> constraints_;
