@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <pinocchio/algorithm/centroidal-derivatives.hpp>
+#include <pinocchio/algorithm/centroidal.hpp>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/spatial.hpp>
@@ -30,6 +31,7 @@ LinearizedFrame::Term& LinearizedFrame::own(Index frame) {
 MotionLinearizer::MotionLinearizer(const pinocchio::Model& model, std::vector<BodyPoint> points)
     : model_(model), points_(std::move(points)), data_(model) {
   for (const pinocchio::Inertia& inertia : model.inertias) mass_ += inertia.mass();
+  weight_ = mass_ * findUnitGravity(model.gravity.linear());
   for (Eigen::VectorXd* vector : {&v_, &a_, &step_}) vector->setZero(model.nv);
   for (auto* matrix : {&of_momentum_, &by_q_, &by_v_, &by_a_, &by_step_, &jacobian_})
     matrix->setZero(6, model.nv);
@@ -63,8 +65,8 @@ void MotionLinearizer::findDifferences(const Eigen::VectorXd& time, Index frame)
     differences_.push_back({frame + inward * (k + 1), inverse(k, 0), 2. * inverse(k, 1)});
 }
 
-void MotionLinearizer::linearize(const Eigen::VectorXd& time, const Eigen::MatrixXd& q, Index frame,
-                                 std::uint32_t asked, LinearizedFrame& linear) {
+void MotionLinearizer::findDerivatives(const Eigen::VectorXd& time, const Eigen::MatrixXd& q,
+                                       Index frame) {
   findDifferences(time, frame);
   v_.setZero();
   a_.setZero();
@@ -73,17 +75,37 @@ void MotionLinearizer::linearize(const Eigen::VectorXd& time, const Eigen::Matri
     v_ += difference.velocity * step_;
     a_ += difference.acceleration * step_;
   }
+}
+
+void MotionLinearizer::locate(LinearizedFrame& linear) const {
+  linear.com = data_.com[0];
+  linear.wrench << data_.dhg.linear() - mass_ * model_.gravity.linear(), data_.dhg.angular();
+  linear.wrench /= weight_;
+  linear.points.resize(3, Index(points_.size()));
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    linear.points.col(Index(k)) = data_.oMi[points_[k].joint].act(points_[k].place);
+    linear.points(2, Index(k)) -= points_[k].drop;
+  }
+}
+
+void MotionLinearizer::evaluate(const Eigen::VectorXd& time, const Eigen::MatrixXd& q, Index frame,
+                                LinearizedFrame& linear) {
+  findDerivatives(time, q, frame);
+  pinocchio::computeCentroidalMomentumTimeVariation(model_, data_, q.col(frame), v_, a_);
+  locate(linear);
+}
+
+void MotionLinearizer::linearize(const Eigen::VectorXd& time, const Eigen::MatrixXd& q, Index frame,
+                                 std::uint32_t asked, LinearizedFrame& linear) {
+  findDerivatives(time, q, frame);
   pinocchio::computeCentroidalDynamicsDerivatives(model_, data_, q.col(frame), v_, a_, of_momentum_,
                                                   by_q_, by_v_, by_a_);
-  const double weight = mass_ * findUnitGravity(model_.gravity.linear());
-  linear.com = data_.com[0];
+  locate(linear);
   linear.of_com = by_a_.topRows<3>() / mass_;
-  linear.wrench << data_.dhg.linear() - mass_ * model_.gravity.linear(), data_.dhg.angular();
-  linear.wrench /= weight;
-
-  linear.terms.assign(1, {frame, by_q_ / weight});
+  linear.of_points.resize(points_.size());
+  linear.terms.assign(1, {frame, by_q_ / weight_});
   for (const Difference& difference : differences_) {
-    by_step_ = (difference.velocity * by_v_ + difference.acceleration * by_a_) / weight;
+    by_step_ = (difference.velocity * by_v_ + difference.acceleration * by_a_) / weight_;
     pinocchio::dDifference(model_, q.col(frame), q.col(difference.other), by_here_,
                            pinocchio::ARG0);
     pinocchio::dDifference(model_, q.col(frame), q.col(difference.other), by_other_,
@@ -97,20 +119,15 @@ void MotionLinearizer::linearize(const Eigen::VectorXd& time, const Eigen::Matri
 }
 
 void MotionLinearizer::linearizePoints(std::uint32_t asked, LinearizedFrame& linear) {
-  linear.points.resize(3, Index(points_.size()));
-  linear.of_points.resize(points_.size());
   pinocchio::JointIndex joint = 0;  // of the Jacobian
   for (std::size_t k = 0; k < points_.size(); ++k) {
-    const pinocchio::SE3& placement = data_.oMi[points_[k].joint];
-    const Eigen::Vector3d arm = placement.rotation() * points_[k].place;
-    linear.points.col(Index(k)) = placement.translation() + arm;
-    linear.points(2, Index(k)) -= points_[k].drop;
     if (!(asked >> k & 1u)) continue;
     if (joint != points_[k].joint) {
       joint = points_[k].joint;
       jacobian_.setZero();
       pinocchio::getJointJacobian(model_, data_, joint, pinocchio::LOCAL_WORLD_ALIGNED, jacobian_);
     }
+    const Eigen::Vector3d arm = data_.oMi[joint].rotation() * points_[k].place;
     linear.of_points[k] = jacobian_.topRows<3>() - pinocchio::skew(arm) * jacobian_.bottomRows<3>();
   }
 }

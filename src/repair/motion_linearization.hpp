@@ -45,11 +45,19 @@ class MotionLinearizer {
 
   const std::vector<BodyPoint>& points() const { return points_; }
 
+  /// What a frame of a motion needs that has four at least, and where its points are: nothing of
+  /// the derivatives.
+  void evaluate(const Eigen::VectorXd& time, const Eigen::MatrixXd& q, Eigen::Index frame,
+                LinearizedFrame& linear);
+
   /// Linearizes a frame of a motion that has four at least.
   /// @param q         configurations, nq × frames
   /// @param asked     a bit for each point whose derivative is asked for
   void linearize(const Eigen::VectorXd& time, const Eigen::MatrixXd& q, Eigen::Index frame,
                  std::uint32_t asked, LinearizedFrame& linear);
+
+  /// Adds derivatives of points, of the frame that was linearized last.
+  void linearizePoints(std::uint32_t asked, LinearizedFrame& linear);
 
   /// The frames whose configurations a frame's wrench depends on: the first and the last.
   static std::pair<Eigen::Index, Eigen::Index> findReach(Eigen::Index frame, Eigen::Index frames);
@@ -62,12 +70,13 @@ class MotionLinearizer {
   };
 
   void findDifferences(const Eigen::VectorXd& time, Eigen::Index frame);
-  void linearizePoints(std::uint32_t asked, LinearizedFrame& linear);
+  void findDerivatives(const Eigen::VectorXd& time, const Eigen::MatrixXd& q, Eigen::Index frame);
+  void locate(LinearizedFrame& linear) const;
 
   const pinocchio::Model& model_;
   const std::vector<BodyPoint> points_;
   pinocchio::Data data_;
-  double mass_ = 0.;
+  double mass_ = 0., weight_ = 0.;
   std::vector<Difference> differences_;
   Eigen::VectorXd v_, a_, step_;
   Eigen::Matrix<double, 6, Eigen::Dynamic> of_momentum_, by_q_, by_v_, by_a_, by_step_, jacobian_;

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 
 namespace dynacom::internal {
@@ -17,13 +18,22 @@ namespace {
 // then.
 constexpr double kPenalty = 2000., kFlight = 300., kRelaxation = 1.6;
 constexpr int kRounds = 2, kIterations = 12;
-// Then, costs count no more: the nearest motion within the cones, with a larger penalty.
-constexpr double kPolish = 100.;
-constexpr int kPolishes = 8, kPolishIterations = 4;
+// Then, costs count no more: the nearest motion within the cones, with larger penalties, of what
+// parts and joints are off, too.
+constexpr double kPolish = 100., kPolishPlaces = 100.;
+constexpr int kPolishes = 8, kPolishIterations = 8;
 // What is missing after that is rounding [m g, m g·m]: with more, distributions are not Solved.
 constexpr double kReached = 1e-10;
+// The polish ends where so many rounds in a row leave more than this part of what was missing
+// before: what remains has no solution nearby.
+constexpr double kProgress = 0.7;
+constexpr int kFailures = 2;
 // Moments count as forces with this lever [m].
 constexpr double kLever = 1.;
+// A joint that is so far from the limit that it is held at costs 1 in a second [rad], [m].
+constexpr double kPinned = 1e-4;
+// By how much more an end that is pinned costs than other frames.
+constexpr double kAnchor = 1e10;
 
 template <class Function>
 void forEachPoint(std::uint32_t set, Function act) {
@@ -43,36 +53,61 @@ WholeBodyWindow::WholeBodyWindow(const WholeBodyProblem& problem, const RepairSe
       settings_(settings),
       linearizer_(problem.model, problem.points),
       projection_(kLever, ConeProjection::kExact),
-      hold_(1. / (settings.held_point * settings.held_point)) {
+      of_place_(1. / (settings.held_point * settings.held_point)) {
   for (const double mu : problem.mu) mu_.push_back(mu * (1. - settings.friction_margin));
 }
 
-void WholeBodyWindow::solve(Index first, Index behind, Eigen::MatrixXd& change,
+// Of a point that pushes, all three coordinates count, of a lifted one its height.
+template <class Function>
+void WholeBodyWindow::forEachRow(const Constraint& constraint, Function act) const {
+  if (!isSought(constraint.frame)) return;
+  forEachPoint(problem_.sets[static_cast<std::size_t>(constraint.frame)],
+               [&](Index point) { act(point, Index(0), Index(3)); });
+  forEachPoint(constraint.lifted, [&](Index point) { act(point, Index(2), Index(1)); });
+}
+
+void WholeBodyWindow::solve(Index first, Index behind, Index asked, Eigen::MatrixXd& change,
                             Eigen::MatrixXd& q) {
-  begin(first, behind);
+  begin(first, behind, asked);
   for (int round = 0; round < kRounds; ++round) {
     linearize(q);
     if (round == 0) restart();
-    if (!factorize(kPenalty)) return;
+    if (!factorize(kPenalty, 1.)) return;
     for (int k = 0; k < kIterations; ++k) {
       iterate(true, change);
       project(true);
     }
     apply(change, q);
   }
-  for (int round = 0; round < kPolishes && linearize(q) > kReached; ++round) {
+  polish(change, q);
+}
+
+void WholeBodyWindow::polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q) {
+  Eigen::MatrixXd best_change, best_q;
+  double best = std::numeric_limits<double>::infinity();
+  for (int round = 0, failed = 0; round <= kPolishes; ++round) {
+    const double missing = linearize(q);
+    failed = missing > kProgress * best ? failed + 1 : 0;
+    if (missing < best) {
+      best = missing;
+      best_change = change.middleCols(first_, behind_ - first_);
+      best_q = q.middleCols(first_, behind_ - first_);
+    }
+    if (best <= kReached || failed == kFailures || round == kPolishes) break;
     restart();
-    if (!factorize(kPenalty * kPolish)) return;
+    if (!factorize(kPenalty * kPolish, kPolishPlaces)) break;
     for (int k = 0; k < kPolishIterations; ++k) {
       iterate(false, change);
       project(false);
     }
     apply(change, q);
   }
+  change.middleCols(first_, behind_ - first_) = best_change;
+  q.middleCols(first_, behind_ - first_) = best_q;
 }
 
-// The frames whose wrench depends on what is sought.
-void WholeBodyWindow::begin(Index first, Index behind) {
+// The frames whose wrench depends on what is sought, and of which something is asked.
+void WholeBodyWindow::begin(Index first, Index behind, Index asked) {
   first_ = first;
   behind_ = behind;
   constraints_.clear();
@@ -80,7 +115,7 @@ void WholeBodyWindow::begin(Index first, Index behind) {
   // No wrench depends on frames that are farther away.
   constexpr Index kFarthest = 3;
   for (Index frame = std::max<Index>(first - kFarthest, 0);
-       frame < std::min(behind + kFarthest, frames); ++frame) {
+       frame < std::min({behind + kFarthest, frames, asked}); ++frame) {
     const auto [low, high] = MotionLinearizer::findReach(frame, frames);
     if (high < first || low >= behind) continue;
     Constraint& constraint = constraints_.emplace_back();
@@ -109,11 +144,7 @@ double WholeBodyWindow::linearize(const Eigen::MatrixXd& q) {
     const std::uint32_t set = problem_.sets[static_cast<std::size_t>(frame)];
     LinearizedFrame& linear = constraint.linear;
     linearizer_.linearize(problem_.time, q, frame, set, linear);
-    constraint.off.setZero(3, linear.points.cols());
-    forEachPoint(set, [&](Index point) {
-      constraint.off.col(point) =
-          linear.points.col(point) - problem_.targets[static_cast<std::size_t>(point)].col(frame);
-    });
+    place(constraint);
     constraint.moved = linear.wrench;
     if (!problem_.free[frame]) {
       projection_.setAnswer(constraint.answer);
@@ -121,7 +152,45 @@ double WholeBodyWindow::linearize(const Eigen::MatrixXd& q) {
     }
     shrink(constraint);
   }
+  pin(q);
   return worst;
+}
+
+// Says how far points are from where they are to be.
+void WholeBodyWindow::place(Constraint& constraint) {
+  const Index frame = constraint.frame;
+  constraint.off.setZero(3, constraint.linear.points.cols());
+  forEachPoint(problem_.sets[static_cast<std::size_t>(frame)], [&](Index point) {
+    constraint.off.col(point) = constraint.linear.points.col(point) -
+                                problem_.targets[static_cast<std::size_t>(point)].col(frame);
+  });
+  if (isSought(frame)) lift(constraint);
+}
+
+// Finds points in the air that are below their floor. Costs leave those that they lift a little
+// below, and what is above needs none.
+void WholeBodyWindow::lift(Constraint& constraint) {
+  const Index frame = constraint.frame;
+  const std::uint32_t set = problem_.sets[static_cast<std::size_t>(frame)];
+  constraint.lifted = 0;
+  for (Index point = 0; point < problem_.floor.rows(); ++point) {
+    const double height = constraint.linear.points(2, point) - problem_.floor(point, frame);
+    if (set >> point & 1u || !(height < 0.)) continue;
+    constraint.off(2, point) = height;
+    constraint.lifted |= std::uint32_t(1) << point;
+  }
+  linearizer_.linearizePoints(constraint.lifted, constraint.linear);
+}
+
+// Finds joints that are beyond a limit; of those within, none needs to be held.
+void WholeBodyWindow::pin(const Eigen::MatrixXd& q) {
+  pins_.clear();
+  for (const LimitedJoint& joint : problem_.joints)
+    for (Index frame = first_; frame < behind_; ++frame)
+      for (const LimitKind kind : kLimitKinds) {
+        const double off = measureExcess(joint, kind, problem_.time, q, frame);
+        if (off > 0.) pins_.push_back({frame, &joint, kind, off});
+      }
 }
 
 // Makes the cones smaller by the margins, and adds to the derivative of the moment that of the
@@ -159,9 +228,35 @@ double WholeBodyWindow::weigh(const Constraint& constraint) const {
   return differ(constraint.frame).duration * penalty_ * (flies ? kFlight : 1.);
 }
 
+double WholeBodyWindow::weighChange(Index frame) const {
+  const bool is_end = frame == 0 || frame == problem_.time.size() - 1;
+  return differ(frame).duration * (problem_.pinned_ends && is_end ? kAnchor : 1.);
+}
+
+// By how much a step of the changes leads beyond a limit.
+double WholeBodyWindow::step(const Pin& pin) const {
+  const Index row = pin.joint->v, column = pin.frame - first_;
+  double step = isOfStep(pin.kind) ? -step_(row, column) : step_(row, column);
+  if (isOfStep(pin.kind) && isSought(pin.frame + 1)) step += step_(row, column + 1);
+  return getSign(pin.kind) * step;
+}
+
+void WholeBodyWindow::addPins() {
+  for (const Pin& pin : pins_) {
+    const Index row = pin.joint->v, here = pin.frame - first_, next = here + 1;
+    const double weight = differ(pin.frame).duration * pinch_;
+    system_(here, here)(row, row) += weight;
+    if (!isOfStep(pin.kind) || !isSought(pin.frame + 1)) continue;
+    system_(next, next)(row, row) += weight;
+    system_(next, here)(row, row) -= weight;
+  }
+}
+
 // The second derivative of the augmented Lagrangian.
-bool WholeBodyWindow::factorize(double penalty) {
+bool WholeBodyWindow::factorize(double penalty, double penalty_of_places) {
   penalty_ = penalty;
+  hold_ = of_place_ * penalty_of_places;
+  pinch_ = penalty_of_places / (kPinned * kPinned);
   const Index last = problem_.time.size() - 1;
   std::vector<Index> first;
   for (Index frame = first_; frame < behind_; ++frame) {
@@ -176,7 +271,7 @@ bool WholeBodyWindow::factorize(double penalty) {
   for (Index frame = std::max<Index>(first_ - 1, 0); frame <= std::min(behind_, last); ++frame) {
     const Difference difference = differ(frame);
     const double factors[3] = {difference.before, difference.here, difference.after};
-    if (isSought(frame)) block(frame, frame).diagonal() += difference.duration * problem_.of_change;
+    if (isSought(frame)) block(frame, frame).diagonal() += weighChange(frame) * problem_.of_change;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j <= i; ++j)
         if (isSought(frame - 1 + i) && isSought(frame - 1 + j))
@@ -185,12 +280,12 @@ bool WholeBodyWindow::factorize(double penalty) {
   }
   for (const Constraint& constraint : constraints_) {
     const Index frame = constraint.frame;
-    if (isSought(frame))
-      forEachPoint(problem_.sets[static_cast<std::size_t>(frame)], [&](Index point) {
-        const auto& derivative = constraint.linear.of_points[static_cast<std::size_t>(point)];
-        block(frame, frame).noalias() +=
-            differ(frame).duration * hold_ * derivative.transpose() * derivative;
-      });
+    forEachRow(constraint, [&](Index point, Index row, Index rows) {
+      const auto derivative =
+          constraint.linear.of_points[static_cast<std::size_t>(point)].middleRows(row, rows);
+      block(frame, frame).noalias() +=
+          differ(frame).duration * hold_ * derivative.transpose() * derivative;
+    });
     const double weight = weigh(constraint);
     const auto& terms = constraint.linear.terms;
     for (std::size_t i = 0; i < terms.size(); ++i)
@@ -199,6 +294,7 @@ bool WholeBodyWindow::factorize(double penalty) {
           block(terms[i].frame, terms[j].frame).noalias() +=
               weight * terms[i].derivative.transpose() * terms[j].derivative;
   }
+  addPins();
   return system_.factorize();
 }
 
@@ -216,7 +312,7 @@ void WholeBodyWindow::addCosts(const Eigen::MatrixXd& change) {
       if (isSought(frame - 1 + i)) step_.col(frame - 1 + i - first_) -= factors[i] * acceleration;
     if (isSought(frame))
       step_.col(frame - first_) -=
-          difference.duration * problem_.of_change.cwiseProduct(change.col(frame));
+          weighChange(frame) * problem_.of_change.cwiseProduct(change.col(frame));
   }
 }
 
@@ -226,17 +322,24 @@ void WholeBodyWindow::iterate(bool with_costs, Eigen::MatrixXd& change) {
   if (with_costs) addCosts(change);
   for (const Constraint& constraint : constraints_) {
     const Index frame = constraint.frame;
-    if (isSought(frame))
-      forEachPoint(problem_.sets[static_cast<std::size_t>(frame)], [&](Index point) {
-        step_.col(frame - first_).noalias() -=
-            differ(frame).duration * hold_ *
-            constraint.linear.of_points[static_cast<std::size_t>(point)].transpose() *
-            constraint.off.col(point);
-      });
+    forEachRow(constraint, [&](Index point, Index row, Index rows) {
+      step_.col(frame - first_).noalias() -=
+          differ(frame).duration * hold_ *
+          constraint.linear.of_points[static_cast<std::size_t>(point)]
+              .middleRows(row, rows)
+              .transpose() *
+          constraint.off.col(point).segment(row, rows);
+    });
     const Vector6 off = weigh(constraint) * (constraint.moved - constraint.given + constraint.dual);
     for (const auto& term : constraint.linear.terms)
       if (isSought(term.frame))
         step_.col(term.frame - first_).noalias() -= term.derivative.transpose() * off;
+  }
+  for (const Pin& pin : pins_) {
+    const Index row = pin.joint->v, column = pin.frame - first_;
+    const double pull = getSign(pin.kind) * differ(pin.frame).duration * pinch_ * pin.off;
+    step_(row, column) += isOfStep(pin.kind) ? pull : -pull;
+    if (isOfStep(pin.kind) && isSought(pin.frame + 1)) step_(row, column + 1) -= pull;
   }
   system_.solve(step_);
   change.middleCols(first_, behind_ - first_) += step_;
@@ -244,13 +347,13 @@ void WholeBodyWindow::iterate(bool with_costs, Eigen::MatrixXd& change) {
     for (const auto& term : constraint.linear.terms)
       if (isSought(term.frame))
         constraint.moved.noalias() += term.derivative * step_.col(term.frame - first_);
-    if (isSought(constraint.frame))
-      forEachPoint(problem_.sets[static_cast<std::size_t>(constraint.frame)], [&](Index point) {
-        constraint.off.col(point).noalias() +=
-            constraint.linear.of_points[static_cast<std::size_t>(point)] *
-            step_.col(constraint.frame - first_);
-      });
+    forEachRow(constraint, [&](Index point, Index row, Index rows) {
+      constraint.off.col(point).segment(row, rows).noalias() +=
+          constraint.linear.of_points[static_cast<std::size_t>(point)].middleRows(row, rows) *
+          step_.col(constraint.frame - first_);
+    });
   }
+  for (Pin& pin : pins_) pin.off += step(pin);
 }
 
 // The wrenches within the cones that are closest to those of the linear model.

@@ -8,6 +8,7 @@
 #include "../inference/cone_projection.hpp"
 #include "block_band.hpp"
 #include "dynacom/motion_repair.hpp"
+#include "joint_limits.hpp"
 #include "motion_linearization.hpp"
 
 namespace dynacom::internal {
@@ -18,11 +19,15 @@ struct WholeBodyProblem {
   std::vector<BodyPoint> points;
   std::vector<double> mu;  // of each point
   Eigen::VectorXd time;
-  Eigen::MatrixXd q;                           // before, nq × frames
-  std::vector<std::uint32_t> sets;             // of each frame: a bit for each point that pushes
-  std::vector<Eigen::Matrix3Xd> targets;       // where points are to be that push, 3 × frames each
+  Eigen::MatrixXd q;                      // before, nq × frames
+  std::vector<std::uint32_t> sets;        // of each frame: a bit for each point that pushes
+  std::vector<Eigen::Matrix3Xd> targets;  // where points are to be that push, 3 × frames each
+  Eigen::MatrixXd floor;  // above which points that do not push are to be, points × frames; NaN
+                          // where that is not known
   Eigen::Array<bool, Eigen::Dynamic, 1> free;  // frames whose wrench is not asked for
   Eigen::VectorXd of_change, of_acceleration;  // costs of squares, nv
+  std::vector<LimitedJoint> joints;            // that are to be within their limits
+  bool pinned_ends;                            // whether the first and the last frame stay
 };
 
 /// Changes of the configurations, frame after frame, found for some frames at a time.
@@ -31,11 +36,14 @@ class WholeBodyWindow {
   /// @param problem, settings  must outlive this
   WholeBodyWindow(const WholeBodyProblem& problem, const RepairSettings& settings);
 
-  /// Finds the changes of the frames from `first` to `behind`, excluded; those before stay as they
-  /// are, those behind have none.
+  /// Finds the changes of the frames from `first` to `behind`, excluded, beginning with those that
+  /// there are; the others stay as they are.
+  /// @param asked   of frames from this one on nothing is asked but that they cost little, so that
+  ///                they lead to what is behind
   /// @param change  in the tangent space at the configurations before, nv × frames
   /// @param q       the configurations that it leads to
-  void solve(Eigen::Index first, Eigen::Index behind, Eigen::MatrixXd& change, Eigen::MatrixXd& q);
+  void solve(Eigen::Index first, Eigen::Index behind, Eigen::Index asked, Eigen::MatrixXd& change,
+             Eigen::MatrixXd& q);
 
  private:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -47,33 +55,53 @@ class WholeBodyWindow {
   struct Constraint {
     Eigen::Index frame;
     LinearizedFrame linear;
-    Eigen::Matrix3Xd off;  // of points from their targets
+    std::uint32_t lifted = 0;  // points that do not push, and are below their floor
+    Eigen::Matrix3Xd off;      // of points from their targets; of lifted ones, z only counts
     Vector6 moved, given, dual;
     ConeProjection::Answer answer;
   };
 
+  // A limit that a joint is beyond.
+  struct Pin {
+    Eigen::Index frame;
+    const LimitedJoint* joint;
+    LimitKind kind;
+    double off;
+  };
+
   Difference differ(Eigen::Index frame) const;
   bool isSought(Eigen::Index frame) const { return first_ <= frame && frame < behind_; }
-  void begin(Eigen::Index first, Eigen::Index behind);
+  void begin(Eigen::Index first, Eigen::Index behind, Eigen::Index asked);
   double linearize(const Eigen::MatrixXd& q);
+  void place(Constraint& constraint);
+  void lift(Constraint& constraint);
   void shrink(Constraint& constraint);
-  bool factorize(double penalty);
+  void pin(const Eigen::MatrixXd& q);
+  double step(const Pin& pin) const;
+  void polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q);
+  bool factorize(double penalty, double penalty_of_places);
+  void addPins();
   void addCosts(const Eigen::MatrixXd& change);
   void iterate(bool with_costs, Eigen::MatrixXd& change);
   void project(bool relaxed);
   void restart();
   void apply(const Eigen::MatrixXd& change, Eigen::MatrixXd& q) const;
   double weigh(const Constraint& constraint) const;
+  double weighChange(Eigen::Index frame) const;
+  template <class Function>
+  void forEachRow(const Constraint& constraint, Function act) const;
 
   const WholeBodyProblem& problem_;
   const RepairSettings& settings_;
   MotionLinearizer linearizer_;
   ConeProjection projection_;
-  const double hold_;       // cost of the square of how far a point is from its place
+  const double of_place_;   // cost of the square of how far a point is from its place
   std::vector<double> mu_;  // shrunk
   Eigen::Index first_ = 0, behind_ = 0;
   std::vector<Constraint> constraints_;
+  std::vector<Pin> pins_;
   double penalty_ = 0.;
+  double hold_ = 0., pinch_ = 0.;  // costs of points and joints that are off, as they are now
   BlockBand<Eigen::Dynamic> system_;
   Eigen::MatrixXd step_;
 };

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "joint_limits.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dynacom::internal {
+
+namespace {
+constexpr double kNone = std::numeric_limits<double>::infinity();
+}
+
+std::vector<LimitedJoint> listLimits(const pinocchio::Model& model, double position_margin,
+                                     double speed_margin) {
+  // What robot descriptions have where there is no limit.
+  constexpr double kHuge = 1e6;
+  std::vector<LimitedJoint> joints;
+  for (pinocchio::JointIndex index = 1; index < pinocchio::JointIndex(model.njoints); ++index) {
+    const auto& joint = model.joints[index];
+    if (joint.nq() != 1 || joint.nv() != 1) continue;
+    LimitedJoint limited = {joint.idx_q(), joint.idx_v(), model.lowerPositionLimit[joint.idx_q()],
+                            model.upperPositionLimit[joint.idx_q()],
+                            model.upperVelocityLimit[joint.idx_v()] * (1. - speed_margin)};
+    const double range = limited.upper - limited.lower;
+    if (range > 0. && std::abs(limited.lower) < kHuge && std::abs(limited.upper) < kHuge) {
+      const double margin = std::min(position_margin, 0.5 * range);
+      limited.lower += margin;
+      limited.upper -= margin;
+    } else {
+      limited.lower = -kNone;
+      limited.upper = kNone;
+    }
+    if (!(limited.speed > 0. && limited.speed < kHuge)) limited.speed = kNone;
+    joints.push_back(limited);
+  }
+  return joints;
+}
+
+double measureExcess(const LimitedJoint& joint, LimitKind kind, const Eigen::VectorXd& time,
+                     const Eigen::MatrixXd& q, Eigen::Index frame) {
+  if (kind == LimitKind::Lower) return joint.lower - q(joint.q, frame);
+  if (kind == LimitKind::Upper) return q(joint.q, frame) - joint.upper;
+  if (frame + 1 >= time.size()) return -kNone;
+  const double step = q(joint.q, frame + 1) - q(joint.q, frame);
+  return getSign(kind) * step - joint.speed * (time[frame + 1] - time[frame]);
+}
+
+}  // namespace dynacom::internal
