@@ -184,15 +184,15 @@ def carry_bodies(
     """
     joints = _find_links(robot, before, position, names, quaternion)
     pose = np.dstack([position, quaternion])
-    poses = [_link_poses(robot.model, q, sorted({*joints} - {0})) for q in (before, after)]
+    poses = [_link_poses(robot.model, q, joints) for q in (before, after)]
     for body, joint in enumerate(joints):
-        if joint:
+        if joint is not None:
             old, new = (every[joint] for every in poses)
             moved, turn = _carry(old, new, position[:, body])
             carried = np.hstack([moved, multiply(turn, _unit(quaternion[:, body]))])
             same = (old == new).all(axis=1)
             pose[:, body] = np.where(same[:, None], pose[:, body], carried)
-    return pose, [body for body, joint in enumerate(joints) if not joint]
+    return pose, [body for body, joint in enumerate(joints) if joint is None]
 
 
 def carry_points(
@@ -215,10 +215,10 @@ def carry_points(
             if np.linalg.norm(away) > TOLERANCE:
                 return None
     joints = _find_links(robot, before, position, names)
-    if not all(joints):
+    if None in joints:
         return None
     moved = np.empty(position.shape)
-    poses = [_link_poses(model, q, sorted({*joints})) for q in (before, after)]
+    poses = [_link_poses(model, q, joints) for q in (before, after)]
     for body, joint in enumerate(joints):
         moved[:, body], _ = _carry(*(every[joint] for every in poses), position[:, body])
     return moved
@@ -422,12 +422,13 @@ def _find_links(
     position: np.ndarray,
     names: Sequence[str] | None,
     quaternion: np.ndarray | None = None,
-) -> list[int]:
-    """The joint that moves each body, 0 where none does.
+) -> list[int | None]:
+    """The joint that moves each body: Pinocchio's 0 where it is at rest in the world, None if none.
 
-    Bodies that are no link's by name belong to the joint in which they move least, by no more than
-    :data:`TOLERANCE`: if there are several, as of joints at rest, to the closest. If all that a
-    body does in any of them is to turn, as fingers do that the robot does not have, so it does.
+    Bodies that are no link's by name belong to the joint, or to the world, in which they move
+    least, by no more than :data:`TOLERANCE`: if there are several, as of joints at rest, to the
+    closest. Those that turn in all of them, as fingers do that the robot does not have, belong to
+    the one in which they do nothing else.
 
     Args:
         position, quaternion: (T, B, 3) and (T, B, 4), or None if only the position is known.
@@ -451,7 +452,7 @@ def _find_links(
         moves = np.linalg.norm(local - local.mean(axis=0), axis=-1).max(axis=0)
         moves = next((m for m in (moves.max(axis=-1), moves[:, 0]) if m.min() <= TOLERANCE), None)
         if moves is None:
-            joints.append(0)
+            joints.append(None)
             continue
         away = np.linalg.norm(own[:, :, 0] - points[:, None, body, 0], axis=-1).max(axis=0)
         joints.append(int(np.argmin(np.where(moves <= moves.min() + _ALIKE, away, np.inf))))
@@ -465,10 +466,12 @@ def _carry(old: np.ndarray, new: np.ndarray, position: np.ndarray) -> tuple[np.n
     return new[:, :3] + np.einsum("tij,tj->ti", rotations(turn), arm), turn
 
 
-def _link_poses(model: pin.Model, q: np.ndarray, joints: Sequence[int]) -> dict[int, np.ndarray]:
+def _link_poses(
+    model: pin.Model, q: np.ndarray, joints: Sequence[int | None]
+) -> dict[int, np.ndarray]:
     """Of each joint, position and quaternion x y z w in the world, (T, 7)."""
     data = model.createData()
-    poses = {joint: np.empty((len(q), 7)) for joint in joints}
+    poses = {joint: np.empty((len(q), 7)) for joint in joints if joint is not None}
     for frame, configuration in enumerate(q):
         pin.forwardKinematics(model, data, configuration)
         for joint, pose in poses.items():

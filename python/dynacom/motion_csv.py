@@ -105,6 +105,8 @@ def write_csv(change: Change) -> bytes:
                     form = _Form("r")
                 else:
                     more[form.decimals] += 1
+        elif form.decimals == 0:  # whole by chance
+            form = _Form("r")
         write = write or form.write
         is_new = (values != columns[name]).tolist()
         for row, cell, value, new in zip(body, texts[name], values.tolist(), is_new, strict=True):
@@ -112,7 +114,8 @@ def write_csv(change: Change) -> bytes:
                 row[place] = f"{cell.before}{write(value)}{cell.after}"
     for decimals, count in more.items():
         change.notes.append(
-            f"{count} columns have {decimals} decimals now: accelerations need them."
+            f"Accelerations need more decimals than the file has: {count} columns have {decimals} "
+            "now."
         )
     dropped = {place for place, name in enumerate(names) if after.get(name, ()) is None}
     for place, row in zip(rows, cells, strict=True):
