@@ -9,13 +9,15 @@ import pinocchio as pin
 
 from dynacom.dynacom_pywrap import ContactSchedule, Motion, differentiate
 from dynacom.errors import DynacomError
-from dynacom.motion_checks import QUATERNION_NOTED, check_finite
+from dynacom.motion_checks import QUATERNION_NOTED, check_finite, normalize
 from dynacom.motion_clip import Clip, is_point
 from dynacom.motion_joints import brief, joint_angles
 from dynacom.robots import STANDARD_GRAVITY
 
 #: A joint that the file does not give has moved if it did so by more than this [rad, m].
 _MOVED = 1e-9
+#: How far from 1 norms of quaternions may be that are to be written.
+_NORM_ERROR = 1e-6
 #: How large accelerations may be that rounding makes [m/s^2, rad/s^2]: half of the thousandth of
 #: gravity by which the ground's force may be off in flight, where it is zero. The other half is for
 #: what rounded angles do to the centre of mass, whose levers about the joints are below a metre.
@@ -65,9 +67,11 @@ class Change:
         q = np.asarray(q, dtype=float)
         if q.shape != clip.q.shape:
             raise DynacomError(f"q must have shape {clip.q.shape}, got {q.shape}")
-        norms = np.linalg.norm(q[:, 3:7], axis=1)
-        if not np.isfinite(q).all() or np.abs(norms - 1.0).max() > 1e-6:
+        error = np.abs(np.linalg.norm(q[:, 3:7], axis=1) - 1.0)
+        if not np.isfinite(q).all() or error.max() > _NORM_ERROR:
             raise DynacomError("q must hold finite numbers and quaternions of norm 1, got others")
+        q = q.copy()
+        q[:, 3:7], _, _ = normalize(clip.path, q[:, 3:7])
         if schedule is not None and len(schedule.active) != frames:
             raise DynacomError(
                 f"schedule must have {frames} frames, as the clip, got {len(schedule.active)}"

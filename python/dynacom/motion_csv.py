@@ -10,7 +10,7 @@ import re
 import warnings
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -87,42 +87,59 @@ def write_csv(change: Change) -> bytes:
         for place, name in enumerate(names)
         if after.get(name) is not None
     }
-    forms = {name: _Form.of([cell.number for cell in column]) for name, column in texts.items()}
-    is_shortest = any(form.kind == "r" for form in forms.values())
-    more: Counter[int] = Counter()
+    writers = _find_writers(change, after, texts)
     for place, name in enumerate(names):
         if name not in texts:
             continue
-        values, form, write = after[name], forms[name], None
-        if is_mask(name):
-            write = _truth_style([cell.number for cell in texts[name]])
-            form = form.for_truth(values)
-        elif not is_contact(name):
-            form = form.for_accelerations(values, change.rate)
-            if form != forms[name]:
-                # Of zeros alone nobody knows how many digits others would have.
-                if is_shortest:
-                    form = _Form("r")
-                else:
-                    more[form.decimals] += 1
-        elif form.decimals == 0:  # whole by chance
-            form = _Form("r")
-        write = write or form.write
+        values, write = after[name], writers[name]
         is_new = (values != columns[name]).tolist()
         for row, cell, value, new in zip(body, texts[name], values.tolist(), is_new, strict=True):
             if new:
                 row[place] = f"{cell.before}{write(value)}{cell.after}"
-    for decimals, count in more.items():
-        change.notes.append(
-            f"Accelerations need more decimals than the file has: {count} columns have {decimals} "
-            "now."
-        )
     dropped = {place for place, name in enumerate(names) if after.get(name, ()) is None}
     for place, row in zip(rows, cells, strict=True):
         end = lines[place][len(lines[place].rstrip("\r\n")) :]
         kept = (cell for column, cell in enumerate(row) if column not in dropped)
         lines[place] = ",".join(kept) + end
     return table.file.with_text("".join(lines))
+
+
+def _find_writers(
+    change: Change,
+    after: Mapping[str, np.ndarray | None],
+    texts: "Mapping[str, Sequence[_Cell]]",
+) -> dict[str, Callable[[float], str]]:
+    """How the numbers of each column are written.
+
+    Args:
+        after: column's name -> numbers, (T,).
+        texts: the same of what is in the file.
+    """
+    forms = {name: _Form.of([cell.number for cell in cells]) for name, cells in texts.items()}
+    is_shortest = any(form.kind == "r" for form in forms.values())
+    writers, more = {}, Counter()
+    for name, form in forms.items():
+        values = after[name]
+        if is_mask(name):
+            style = _truth_style([cell.number for cell in texts[name]])
+            writers[name] = style or form.for_truth(values).write
+            continue
+        if is_contact(name):
+            fine = form if form.decimals else _Form("r")  # whole by chance
+        else:
+            fine = form.for_accelerations(values, change.rate)
+            # Of zeros alone nobody knows how many digits others would have.
+            if fine != form and is_shortest:
+                fine = _Form("r")
+            elif fine != form:
+                more[fine.decimals] += 1
+        writers[name] = fine.write
+    for decimals, count in more.items():
+        change.notes.append(
+            f"Accelerations need more decimals than the file has: {count} columns have {decimals} "
+            "now."
+        )
+    return writers
 
 
 @dataclass(frozen=True)

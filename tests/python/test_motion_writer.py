@@ -244,6 +244,12 @@ def test_order_and_sign_of_quaternions(tmp_path, toy, order, sign):
     clip, found, out, _ = written(path, toy, 1e-14, fps=60, quat=order)
     rows = np.loadtxt(out, delimiter=",")[:, 3:7]
     assert (np.einsum("ti,ti->t", rows, quaternion) > 0.9).all()
+    # The file's sign, whatever that of q.
+    q = moved(toy, clip)
+    q[:, 3:7] *= -1.0
+    opposite = tmp_path / "opposite.csv"
+    write_motion(clip, opposite, q)
+    assert opposite.read_bytes() == out.read_bytes()
     # Of norm 1, in frames that have not changed too.
     assert clip.quaternion_error.max() > 5e-3
     assert found.quaternion_error.max() < 1e-15
