@@ -614,6 +614,43 @@ def test_bodies_and_joints_that_the_robot_does_not_have(tmp_path, toy):
     assert_array_equal(arrays["joint_vel"][:, 0], np.ones(90))
 
 
+def test_bodies_of_joints_at_rest(tmp_path, toy):
+    """A link that has not moved in another one so far is still its own: the closest."""
+    motion = sway(toy)
+    q, angles = motion.q.copy(), motion.angles.copy()
+    for name in ("z_knee", "b_toe", "a_slide"):
+        angles[:, motion.names.index(name)] = 0.1
+        q[:, toy.model.joints[toy.model.getJointId(name)].idx_q] = 0.1
+    position, quaternion = body_poses(toy, q, LINKS)
+    path, out = tmp_path / "motion.npz", tmp_path / "out.npz"
+    changes = {"joint_pos": angles, "body_pos_w": position, "body_quat_w": quaternion}
+    clip = read_motion(tracking(path, toy, **changes), toy)
+    write_motion(clip, out, moved(toy, clip))
+    assert_bodies(toy, read_motion(out, toy), out, LINKS, 1e-12)
+
+
+def test_signs_of_bodies(tmp_path, toy):
+    """Where a turn passes half a circle, w passes zero, and quaternions go on."""
+    motion = sway(toy)
+    q = motion.q.copy()
+    turn = pin.Quaternion(pin.exp3(np.array([0.0, 0.0, np.pi - 1.5])))
+    for row in q:
+        row[:3] = turn.matrix() @ row[:3]
+        row[3:7] = (turn * pin.Quaternion(*row[[6, 3, 4, 5]])).coeffs()
+    position, quaternion = body_poses(toy, q, LINKS)
+    for row in range(1, 90):
+        opposite = np.einsum("bi,bi->b", quaternion[row - 1], quaternion[row]) < 0.0
+        quaternion[row][opposite] *= -1.0
+    assert (quaternion[:, :, 0].min(axis=0) < 0.0).any()
+    path, out = tmp_path / "motion.npz", tmp_path / "out.npz"
+    changes = {"body_pos_w": position, "body_quat_w": quaternion}
+    clip = read_motion(tracking(path, toy, **changes), toy)
+    write_motion(clip, out, moved(toy, clip))
+    with np.load(out) as archive:
+        assert (np.einsum("tbi,tbi->tb", archive["body_quat_w"], quaternion) > 0.9).all()
+    assert_bodies(toy, read_motion(out, toy), out, LINKS, 1e-12)
+
+
 def test_nameless_bodies_that_are_no_link(tmp_path, toy):
     """Where the root is in joint_pos, they are left out, and the file can be read without."""
     motion = sway(toy)
