@@ -115,7 +115,9 @@ from dynacom.dynacom_pywrap import (
 )
 from dynacom.errors import DynacomError, NotReadyError
 from dynacom.motion_file import Clip, read_motion
+from dynacom.motion_mark import mark_of
 from dynacom.motion_report import MotionReport, analyze
+from dynacom.motion_writer import write_motion
 from dynacom.robots import Payload, Robot, load_robot, make_robot, parse_payload
 from dynacom.schedule_file import read_schedule, write_schedule
 
@@ -227,6 +229,7 @@ __all__ = [
     "kVelocityMismatch",
     "load_robot",
     "make_robot",
+    "mark_of",
     "parse_payload",
     "readCentroidalState",
     "read_motion",
@@ -235,5 +238,6 @@ __all__ = [
     "repairMotion",
     "splitContacts",
     "summarizeMotion",
+    "write_motion",
     "write_schedule",
 ]

@@ -17,6 +17,8 @@ from dynacom.errors import DynacomError
 from dynacom.motion_joints import (
     ROOT_JOINT,
     configurations,
+    conjugate,
+    multiply,
     rotations,
     tree_orders,
     wrong_count,
@@ -69,12 +71,18 @@ def sample_bodies(
         names: of the bodies.
     """
     count = len(position)
-    frames = np.unique(np.linspace(0, count - 1, min(count, _FRAMES)).astype(int))
-    quaternion = quaternion[frames]
-    quaternion = quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
-    return BodySample(
-        frames, root[frames], position[frames], rotations(quaternion), tuple(names or ())
-    )
+    frames = _sample_frames(count)
+    rotation = rotations(_unit(quaternion[frames]))
+    return BodySample(frames, root[frames], position[frames], rotation, tuple(names or ()))
+
+
+def _sample_frames(count: int) -> np.ndarray:
+    """Indices of some of so many frames."""
+    return np.unique(np.linspace(0, count - 1, min(count, _FRAMES)).astype(int))
+
+
+def _unit(quaternion: np.ndarray) -> np.ndarray:
+    return quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
 
 
 def root_link(robot: Robot) -> str:
@@ -150,6 +158,84 @@ def find_order(
     raise _wrong_robot(
         path, robot, f"no order of the joints does; {title} puts {where} {error:.2g} m away"
     )
+
+
+def carry_bodies(
+    robot: Robot,
+    before: np.ndarray,
+    after: np.ndarray,
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    names: Sequence[str] | None,
+) -> tuple[np.ndarray, list[int]]:
+    """Takes bodies along with the links that they belong to.
+
+    A body belongs to the link of its name, else to the one in which it does not move. It stays
+    where the file has it in its link: robots of other revisions keep what they differ by.
+
+    Args:
+        before, after: configurations (T, nq).
+        position: (T, B, 3), before.
+        quaternion: (T, B, 4), x y z w, before, of norms close to 1.
+        names: of the bodies, if there.
+
+    Returns:
+        Their poses after, (T, B, 7), and which bodies belong to no link and are where they were.
+    """
+    joints = _find_links(robot, before, position, names, quaternion)
+    pose = np.dstack([position, quaternion])
+    poses = [_link_poses(robot.model, q, joints) for q in (before, after)]
+    for body, joint in enumerate(joints):
+        if joint is not None:
+            old, new = (every[joint] for every in poses)
+            moved, turn = _carry(old, new, position[:, body])
+            carried = np.hstack([moved, multiply(turn, _unit(quaternion[:, body]))])
+            same = (old == new).all(axis=1)
+            pose[:, body] = np.where(same[:, None], pose[:, body], carried)
+    return pose, [body for body, joint in enumerate(joints) if joint is None]
+
+
+def carry_points(
+    robot: Robot, before: np.ndarray, after: np.ndarray, position: np.ndarray, names: Sequence[str]
+) -> np.ndarray | None:
+    """The same for bodies of which a file has the positions only, (T, B, 3).
+
+    None if links of these names are elsewhere, or a body belongs to none.
+    """
+    model, data = robot.model, robot.model.createData()
+    links = [
+        (body, model.getFrameId(name, pin.FrameType.BODY))
+        for body, name in enumerate(names)
+        if model.existFrame(name, pin.FrameType.BODY)
+    ]
+    for frame in _sample_frames(len(before)):
+        pin.framesForwardKinematics(model, data, before[frame])
+        for body, link in links:
+            away = data.oMf[link].translation - position[frame, body]
+            if np.linalg.norm(away) > TOLERANCE:
+                return None
+    joints = _find_links(robot, before, position, names)
+    if None in joints:
+        return None
+    moved = np.empty(position.shape)
+    poses = [_link_poses(model, q, joints) for q in (before, after)]
+    for body, joint in enumerate(joints):
+        moved[:, body], _ = _carry(*(every[joint] for every in poses), position[:, body])
+    return moved
+
+
+def axis_vectors(robot: Robot, names: Sequence[str], angles: np.ndarray) -> np.ndarray | None:
+    """Rotations of joints about their axes, as vectors (T, k, 3); None if some joints slide.
+
+    Args:
+        names: of k joints.
+        angles: (T, k).
+    """
+    if not robot.joints.take(names).turns.all():
+        return None
+    axes = _axes(robot.model)
+    vectors = np.array([axes[robot.model.getJointId(name)] for name in names])
+    return angles[:, :, None] * vectors
 
 
 def _from_degrees(robot: Robot, names: Sequence[str], angles: np.ndarray) -> np.ndarray:
@@ -328,3 +414,66 @@ def _points(position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Origins and tips of the axes, (..., 4, 3), of frames at (..., 3), (..., 3, 3)."""
     tips = position[..., None, :] + LEVER * np.swapaxes(rotation, -1, -2)
     return np.concatenate([position[..., None, :], tips], axis=-2)
+
+
+def _find_links(
+    robot: Robot,
+    q: np.ndarray,
+    position: np.ndarray,
+    names: Sequence[str] | None,
+    quaternion: np.ndarray | None = None,
+) -> list[int | None]:
+    """The joint that moves each body: Pinocchio's 0 where it is at rest in the world, None if none.
+
+    Bodies that are no link's by name belong to the joint, or to the world, in which they move
+    least, by no more than :data:`TOLERANCE`: if there are several, as of joints at rest, to the
+    closest. Those that turn in all of them, as fingers do that the robot does not have, belong to
+    the one in which they do nothing else.
+
+    Args:
+        position, quaternion: (T, B, 3) and (T, B, 4), or None if only the position is known.
+    """
+    model = robot.model
+    frames = _sample_frames(len(q))
+    origin, rotation = _joint_poses(model, q[frames])
+    own = _points(origin, rotation)
+    if quaternion is None:
+        points = position[frames][:, :, None]
+    else:
+        points = _points(position[frames], rotations(_unit(quaternion[frames])))
+    joints = []
+    for body in range(position.shape[1]):
+        name = names[body] if names else ""
+        if names and model.existFrame(name, pin.FrameType.BODY):
+            joints.append(model.frames[model.getFrameId(name, pin.FrameType.BODY)].parentJoint)
+            continue
+        # In each joint: (S, joints, points, 3).
+        local = np.einsum("sjba,sjpb->sjpa", rotation, points[:, None, body] - origin[:, :, None])
+        moves = np.linalg.norm(local - local.mean(axis=0), axis=-1).max(axis=0)
+        moves = next((m for m in (moves.max(axis=-1), moves[:, 0]) if m.min() <= TOLERANCE), None)
+        if moves is None:
+            joints.append(None)
+            continue
+        away = np.linalg.norm(own[:, :, 0] - points[:, None, body, 0], axis=-1).max(axis=0)
+        joints.append(int(np.argmin(np.where(moves <= moves.min() + _ALIKE, away, np.inf))))
+    return joints
+
+
+def _carry(old: np.ndarray, new: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where points (T, 3) get by a motion from old to new poses, (T, 7), and its turns, (T, 4)."""
+    turn = multiply(new[:, 3:], conjugate(old[:, 3:]))
+    arm = position - old[:, :3]
+    return new[:, :3] + np.einsum("tij,tj->ti", rotations(turn), arm), turn
+
+
+def _link_poses(
+    model: pin.Model, q: np.ndarray, joints: Sequence[int | None]
+) -> dict[int, np.ndarray]:
+    """Of each joint, position and quaternion x y z w in the world, (T, 7)."""
+    data = model.createData()
+    poses = {joint: np.empty((len(q), 7)) for joint in joints if joint is not None}
+    for frame, configuration in enumerate(q):
+        pin.forwardKinematics(model, data, configuration)
+        for joint, pose in poses.items():
+            pose[frame] = pin.SE3ToXYZQUAT(data.oMi[joint])
+    return poses

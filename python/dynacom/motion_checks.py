@@ -117,6 +117,11 @@ def to_xyzw(quaternion: np.ndarray, order: str) -> np.ndarray:
     return quaternion if order == "xyzw" else quaternion[..., [1, 2, 3, 0]]
 
 
+def from_xyzw(quaternion: np.ndarray, order: str) -> np.ndarray:
+    """The inverse of :func:`to_xyzw`."""
+    return quaternion if order == "xyzw" else quaternion[..., [3, 0, 1, 2]]
+
+
 def normalize(
     path: Path,
     quaternion: np.ndarray,

@@ -15,6 +15,16 @@ from dynacom.motion_joints import brief, configurations, joint_angles
 from dynacom.robots import Robot
 
 
+@dataclass(frozen=True)
+class Options:
+    """What the caller of ``read_motion`` knows of the file."""
+
+    fps: float | None = None
+    quat: str | None = None
+    trust: bool = False
+    clip: str | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Clip:
     """What a motion file holds, in the robot's coordinates: T frames."""
@@ -41,16 +51,12 @@ class Clip:
     notes: tuple[str, ...]
     #: Where the file has dropped frames, which are made anew here; None where it has not.
     gaps: Gaps | None = None
-
-
-@dataclass(frozen=True)
-class Options:
-    """What the caller of ``read_motion`` knows of the file."""
-
-    fps: float | None = None
-    quat: str | None = None
-    trust: bool = False
-    clip: str | None = None
+    #: Whether the file is marked as exact, so that it need not be filtered.
+    exact: bool = False
+    #: How the file was read, and whose motion it is: for :func:`write_motion`. None where the clip
+    #: is not from a file.
+    options: Options | None = field(default=None, repr=False)
+    robot: Robot | None = field(default=None, repr=False)
 
 
 def clip_from_joints(
@@ -61,6 +67,7 @@ def clip_from_joints(
     quaternion: np.ndarray,
     names: Sequence[str],
     angles: np.ndarray,
+    options: Options,
     **others: object,
 ) -> Clip:
     """A clip of what the file says of the root and of some joints.
@@ -76,7 +83,7 @@ def clip_from_joints(
         DynacomError: as there.
     """
     q = configurations(robot, position, quaternion, names, angles)
-    return clip_from_configurations(path, robot, time, q, names=names, **others)
+    return clip_from_configurations(path, robot, time, q, options, names=names, **others)
 
 
 def clip_from_configurations(
@@ -84,16 +91,17 @@ def clip_from_configurations(
     robot: Robot,
     time: np.ndarray,
     q: np.ndarray,
+    options: Options,
     *,
     names: Sequence[str],
     order: str | None,
     option: bool = False,
-    believed: bool = False,
     notes: Sequence[str] = (),
     v: np.ndarray | None = None,
     a: np.ndarray | None = None,
     schedule: ContactSchedule | None = None,
     forces: Mapping[str, np.ndarray] | None = None,
+    exact: bool = False,
 ) -> Clip:
     """A clip of configurations, whose numbers are finite, and whose quaternions may need a norm.
 
@@ -102,14 +110,16 @@ def clip_from_configurations(
     Args:
         names: of the joints that the file gives.
         order: of the file's quaternions; see :func:`normalize`.
-        option, believed: whether ``--quat`` can change it, and whether it says it.
+        option: whether ``--quat`` can change it.
 
     Raises:
         DynacomError: quaternions of another order or far from norm 1, angles in degrees.
     """
     notes = list(notes)
     q = q.copy()
-    q[:, 3:7], error, doubts = normalize(path, q[:, 3:7], order, option, believed)
+    q[:, 3:7], error, doubts = normalize(
+        path, q[:, 3:7], order, option, option and options.quat is not None
+    )
     notes += doubts
     notes += check_angles(path, robot, names, joint_angles(robot, q, names))
     known, there = robot.joints.names, set(names)
@@ -131,7 +141,22 @@ def clip_from_configurations(
         v, a = (None if values is None else gaps.interpolated(values) for values in (v, a))
         schedule = None if schedule is None else gaps.schedule(schedule)
         forces = gaps.forces(forces)
-    return Clip(path, time, q, v, a, given, schedule, forces, error, tuple(notes), gaps)
+    return Clip(
+        path,
+        time,
+        q,
+        v,
+        a,
+        given,
+        schedule,
+        forces,
+        error,
+        tuple(notes),
+        gaps,
+        exact,
+        options,
+        robot,
+    )
 
 
 def schedule_from_masks(names: Sequence[str], masks: np.ndarray) -> ContactSchedule:

@@ -64,9 +64,7 @@ def read_motion(
         robot = load_robot(robot)
     if quat not in (None, "xyzw", "wxyz"):
         raise DynacomError(f"quat must be xyzw or wxyz, got '{quat}'")
-    suffix = path.suffix.lower()
-    if suffix == ".gz":
-        suffix = "".join(path.suffixes[-2:]).lower()
+    suffix = suffix_of(path)
     if suffix not in _READERS:
         if path.is_dir():
             raise DynacomError(f"{path}: cannot be read (Is a directory)")
@@ -76,3 +74,8 @@ def read_motion(
             return _READERS[suffix](path, robot, Options(fps, quat, trust, clip))
     except OSError as error:
         raise DynacomError(f"{path}: cannot be read ({error.strerror or error})") from error
+
+
+def suffix_of(path: Path) -> str:
+    """How the name ends, in small letters; if it is compressed, by two."""
+    return "".join(path.suffixes[-2 if path.suffix.lower() == ".gz" else -1 :]).lower()

@@ -48,9 +48,13 @@ class Gaps:
         )
         return f"{what}, so that frames are evenly spaced."
 
+    def places(self) -> np.ndarray:
+        """Where the file's frames are among all, (T,)."""
+        return np.concatenate([[0], np.cumsum(self.missing + 1)])
+
     def times(self) -> np.ndarray:
         """Of all frames, (T + missing,)."""
-        places = np.concatenate([[0], np.cumsum(self.missing + 1)])
+        places = self.places()
         return np.interp(np.arange(places[-1] + 1), places, self.time)
 
     def repeated(self, values: np.ndarray) -> np.ndarray:
@@ -86,8 +90,7 @@ class Gaps:
 
     def _stencils(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
         """Of each missing frame: its place, the frames around it, and Lagrange's weights."""
-        places = np.concatenate([[0], np.cumsum(self.missing + 1)])
-        times = self.times()
+        places, times = self.places(), self.times()
         for before in np.flatnonzero(self.missing).tolist():
             rows = np.arange(max(before - 1, 0), min(before + 3, len(self.time)))
             nodes = self.time[rows]

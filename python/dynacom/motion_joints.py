@@ -181,3 +181,16 @@ def rotations(quaternion: np.ndarray) -> np.ndarray:
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def multiply(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Products of quaternions x y z w, (..., 4): the rotation on the right comes first."""
+    a, b = left[..., :3], right[..., :3]
+    u, w = left[..., 3:], right[..., 3:]
+    scalar = u * w - np.sum(a * b, axis=-1, keepdims=True)
+    return np.concatenate([u * b + w * a + np.cross(a, b), scalar], axis=-1)
+
+
+def conjugate(quaternion: np.ndarray) -> np.ndarray:
+    """Inverses of quaternions x y z w, (..., 4), of norm 1."""
+    return quaternion * [-1.0, -1.0, -1.0, 1.0]

@@ -1,44 +1,25 @@
 # SPDX-License-Identifier: BSD-2-Clause
-"""Motions from NumPy archives: plain ones, and those of whole_body_tracking."""
+"""Motions from and into NumPy archives; elsewhere, those of whole_body_tracking."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
 from dynacom.errors import DynacomError
-from dynacom.motion_bodies import (
-    BodySample,
-    check_bodies,
-    find_order,
-    root_link,
-    sample_bodies,
-)
-from dynacom.motion_checks import (
-    QUATERNION_ERROR,
-    check_angles,
-    check_finite,
-    make_time,
-    normalize,
-    to_xyzw,
-)
+from dynacom.motion_arrays import Arrays, open_archive, rewrite
+from dynacom.motion_change import Change
+from dynacom.motion_checks import make_time
 from dynacom.motion_clip import (
     Clip,
     Options,
     check_contacts,
     clip_from_configurations,
-    clip_from_joints,
     is_point,
     schedule_from_masks,
 )
-from dynacom.motion_joints import (
-    joint_counts,
-    match_joints,
-    order_without_names,
-    rotations,
-)
+from dynacom.motion_tracking import changed_tracking, read_tracking
 from dynacom.robots import Robot
 
 
@@ -49,92 +30,29 @@ def read_npz(path: Path, robot: Robot, options: Options) -> Clip:
         DynacomError: as :func:`read_motion`.
         OSError: the file cannot be read.
     """
-    with path.open("rb") as file:
-        try:
-            archive = np.load(file, allow_pickle=False)
-        except Exception as error:  # NumPy promises no type for what is no archive, or a broken one
-            raise DynacomError(
-                f"{path}: must be a NumPy archive (.npz), got another file"
-            ) from error
-        if not isinstance(archive, np.lib.npyio.NpzFile):
-            raise DynacomError(f"{path}: must be a NumPy archive (.npz), got a single array")
-        with archive:
-            arrays = _Arrays(path, archive)
-            read = _read_tracking if "joint_pos" in archive else _read_plain
-            return read(path, robot, arrays, options)
+    with open_archive(path) as arrays:
+        read = read_tracking if _is_tracking(arrays) else _read_plain
+        return read(path, robot, arrays, options)
 
 
-class _Arrays:
-    """The archive's arrays, checked as they are taken."""
+def write_npz(change: Change) -> bytes:
+    """The file with a change; numbers keep their types.
 
-    def __init__(self, path: Path, archive: np.lib.npyio.NpzFile) -> None:
-        self._path = path
-        self._archive = archive
-
-    def __contains__(self, name: str) -> bool:
-        return name in self._archive
-
-    def numbers(self, name: str, *shape: int | str) -> np.ndarray:
-        """An array of finite numbers.
-
-        Args:
-            shape: sizes that it must have, or letters for those that it may choose.
-        """
-        array = self._take(name, "iuf", "real numbers").astype(float, copy=False)
-        if array.ndim != len(shape) or any(
-            isinstance(size, int) and got != size
-            for size, got in zip(shape, array.shape, strict=True)
-        ):
-            raise DynacomError(
-                f"{self._path}: {name} must have shape ({', '.join(map(str, shape))}"
-                f"{',' if len(shape) == 1 else ''}), got {array.shape}"
-            )
-        check_finite(self._path, name, array)
-        return array
-
-    def number(self, name: str) -> float:
-        """A single number, in an array of any shape."""
-        array = self._take(name, "iuf", "real numbers")
-        if array.size != 1:
-            raise DynacomError(f"{self._path}: {name} must be one number, got shape {array.shape}")
-        return float(array.item())
-
-    def texts(self, name: str, count: int | None = None) -> tuple[str, ...]:
-        """Texts: so many, or any number."""
-        array = self._take(name, "U", "texts")
-        if array.ndim != 1 or (count is not None and len(array) != count):
-            raise DynacomError(
-                f"{self._path}: {name} must have shape ({count or 'names'},), got {array.shape}"
-            )
-        return tuple(array.tolist())
-
-    def masks(self, name: str, *shape: int) -> np.ndarray:
-        """An array of bool, or of numbers from 0 to 1."""
-        array = self._take(name, "biuf", "bool or numbers")
-        if array.shape != shape:
-            raise DynacomError(f"{self._path}: {name} must have shape {shape}, got {array.shape}")
-        if not ((array >= 0) & (array <= 1)).all():
-            check_finite(self._path, name, array)
-            wrong = array[(array < 0) | (array > 1)]
-            raise DynacomError(f"{self._path}: {name} must be from 0 to 1, got {wrong[0]:g}")
-        return array
-
-    def _take(self, name: str, kinds: str, expected: str) -> np.ndarray:
-        if name not in self._archive:
-            raise DynacomError(
-                f"{self._path}: missing array '{name}', got "
-                f"{', '.join(self._archive.files) or 'none'}"
-            )
-        try:
-            array = np.asarray(self._archive[name])
-        except Exception as error:  # as above
-            raise DynacomError(f"{self._path}: {name} cannot be read ({error})") from error
-        if array.dtype.kind not in kinds:
-            raise DynacomError(f"{self._path}: {name} must be of {expected}, got {array.dtype}")
-        return array
+    Raises:
+        DynacomError: as :func:`write_motion`.
+        OSError: the file cannot be read.
+    """
+    path = change.clip.path
+    with open_archive(path) as arrays:
+        changes = (changed_tracking if _is_tracking(arrays) else _changed_plain)(change, arrays)
+    return rewrite(path, changes, change.mark)
 
 
-def _read_plain(path: Path, robot: Robot, arrays: _Arrays, options: Options) -> Clip:
+def _is_tracking(arrays: Arrays) -> bool:
+    return "joint_pos" in arrays
+
+
+def _read_plain(path: Path, robot: Robot, arrays: Arrays, options: Options) -> Clip:
     """t, q, perhaps v and a, contacts with contact_names, and contact_wrenches."""
     model = robot.model
     time = arrays.numbers("t", "T")
@@ -167,6 +85,7 @@ def _read_plain(path: Path, robot: Robot, arrays: _Arrays, options: Options) -> 
         robot,
         time,
         q,
+        options,
         names=robot.joints.names,
         order="xyzw",
         notes=notes,
@@ -174,7 +93,43 @@ def _read_plain(path: Path, robot: Robot, arrays: _Arrays, options: Options) -> 
         a=a,
         schedule=schedule,
         forces=forces,
+        exact=arrays.is_exact(),
     )
+
+
+def _changed_plain(change: Change, arrays: Arrays) -> dict[str, np.ndarray | None]:
+    """What a change makes of the arrays: those that are others then; None is left out."""
+    frames = len(change.rows)
+    changes: dict[str, np.ndarray | None] = {}
+    old = arrays.numbers("q", frames, change.model.nq)
+    if change.moves:
+        root = [change.position(old[:, :3]), change.quaternion(old[:, 3:7])]
+        new = np.hstack([*root, change.q[:, 7:]])
+        changes["q"] = q = arrays.cast("q", new, change.notes)
+        motion = change.derivatives(change.as_read(q.astype(float)))
+        for name, values in (("v", motion.v), ("a", motion.a)):
+            if name in arrays:
+                changes[name] = arrays.cast(name, values[change.rows], change.notes)
+        change.note_rounding(float(np.spacing(np.abs(q).max())))
+    if "contact_names" not in arrays:
+        return changes
+    names = arrays.texts("contact_names")
+    if change.schedule is not None:
+        masks = arrays.masks("contacts", frames, len(names))
+        unsure = not np.isin(masks, (0.0, 1.0)).all()
+        new = np.array([change.mask(name, unsure) for name in names])
+        changes["contacts"] = new.reshape(len(names), frames).T.astype(masks.dtype)
+        change.note_masks(names)
+    if "contact_wrenches" in arrays and (change.moves or change.forces):
+        framed = "contact_frames" in arrays
+        frames_of = arrays.texts("contact_frames", len(names)) if framed else None
+        wrenches = _frame_wrenches(change, names, frames_of)
+        if wrenches is not None:
+            changes["contact_wrenches"] = arrays.cast("contact_wrenches", wrenches, change.notes)
+        elif change.moves:
+            changes |= {"contact_wrenches": None, "contact_frames": None}
+            change.note_forces(names)
+    return changes
 
 
 def _surface_forces(
@@ -193,33 +148,64 @@ def _surface_forces(
             the contacts.
         wrenches: (T, C, 6), force first.
     """
-    model = robot.model
     forces, notes = {}, []
     for index, contact in enumerate(contacts):
         settings = robot.contacts[contact]
-        own = model.frames[model.getFrameId(settings.frame_name)]
         name = settings.frame_name if frames is None else frames[index]
-        if not model.existFrame(name):
-            notes.append(f"The forces of {contact} are left out: they are in '{name}', no frame.")
-            continue
-        other = model.frames[model.getFrameId(name)]
-        if other.parentJoint != own.parentJoint:
+        placement = _placement(robot.model, settings.frame_name, name)
+        if isinstance(placement, str):
             notes.append(
-                f"The forces of {contact} are left out: they are in '{name}', which does not move "
-                f"with the contact's frame."
+                f"The forces of {contact} are left out: they are in '{name}', {placement}."
             )
             continue
-        placement = own.placement.actInv(other.placement)
         force = wrenches[:, index]
         if not placement.isIdentity(1e-12):
             force = force @ placement.toDualActionMatrix().T
         if is_point(robot, contact):
             force = force[:, :3]
             if settings.world_aligned:
-                rotation = _frame_rotations(model, settings.frame_name, q)
+                rotation = _frame_rotations(robot.model, settings.frame_name, q)
                 force = np.einsum("tij,tj->ti", rotation, force)
         forces[contact] = force
     return forces, notes
+
+
+def _frame_wrenches(
+    change: Change, contacts: Sequence[str], frames: Sequence[str] | None
+) -> np.ndarray | None:
+    """The inverse of :func:`_surface_forces`: (F, C, 6), of the change's forces.
+
+    None if there are none of a contact, or they cannot be taken to its frame.
+
+    Raises:
+        DynacomError: the forces of a contact are not of its kind.
+    """
+    robot = change.clip.robot
+    wrenches = np.zeros((len(change.rows), len(contacts), 6))
+    for index, contact in enumerate(contacts):
+        settings = robot.contacts[contact]
+        name = settings.frame_name if frames is None else frames[index]
+        placement = _placement(robot.model, settings.frame_name, name)
+        if isinstance(placement, str) or contact not in change.forces:
+            return None
+        force = change.forces[contact][change.rows]
+        if is_point(robot, contact) and settings.world_aligned:
+            rotation = _frame_rotations(robot.model, settings.frame_name, change.q)
+            force = np.einsum("tji,tj->ti", rotation, force)
+        wrenches[:, index, : force.shape[1]] = force
+        if not placement.isIdentity(1e-12):
+            wrenches[:, index] @= placement.inverse().toDualActionMatrix().T
+    return wrenches
+
+
+def _placement(model: pin.Model, own: str, name: str) -> pin.SE3 | str:
+    """Of a frame in a contact's own, or why there is none."""
+    if not model.existFrame(name):
+        return "no frame"
+    frame, other = (model.frames[model.getFrameId(which)] for which in (own, name))
+    if other.parentJoint != frame.parentJoint:
+        return "which does not move with the contact's frame"
+    return frame.placement.actInv(other.placement)
 
 
 def _frame_rotations(model: pin.Model, frame: str, q: np.ndarray) -> np.ndarray:
@@ -231,148 +217,3 @@ def _frame_rotations(model: pin.Model, frame: str, q: np.ndarray) -> np.ndarray:
         pin.forwardKinematics(model, data, pin.normalize(model, configuration))
         rotation[row] = pin.updateFramePlacement(model, data, index).rotation
     return rotation
-
-
-def _read_tracking(path: Path, robot: Robot, arrays: _Arrays, options: Options) -> Clip:
-    """The layout of whole_body_tracking: joint_pos, body_pos_w, body_quat_w, fps, and names.
-
-    joint_pos may hold the root's pose too, before the joints.
-    """
-    joint_pos = arrays.numbers("joint_pos", "T", "n")
-    frames, width = joint_pos.shape
-    file_fps = arrays.number("fps") if "fps" in arrays else None
-    time, notes = make_time(path, frames, file_fps=file_fps, fps=options.fps)
-    order = options.quat or "wxyz"
-
-    names = arrays.texts("joint_names") if "joint_names" in arrays else None
-    counts = joint_counts(robot) if names is None else {len(names)}
-    with_root = width not in counts and width - 7 in counts
-    angles = joint_pos[:, 7:] if with_root else joint_pos
-    if names is not None and len(names) != angles.shape[1]:
-        raise DynacomError(
-            f"{path}: joint_names must name the {width} columns of joint_pos, or all but the "
-            f"root's 7, got {len(names)}"
-        )
-
-    bodies = None
-    if "body_pos_w" in arrays or not with_root:
-        bodies = _read_bodies(path, robot, arrays, frames, order)
-    if with_root:
-        position, quaternion = joint_pos[:, :3], to_xyzw(joint_pos[:, 3:7], order)
-    else:
-        position, quaternion = bodies.position[:, bodies.root], bodies.quaternion[:, bodies.root]
-    believed = options.quat is not None
-    unit, _, _ = normalize(path, quaternion, order, True, believed)
-    root = np.hstack([position, unit])
-
-    count = angles.shape[1]
-    columns = list(range(count))
-    if names is not None:
-        columns, more = match_joints(path, robot, names)
-        notes += more
-        names, angles = [names[column] for column in columns], angles[:, columns]
-        if bodies:
-            check_angles(path, robot, names, angles)
-            notes += check_bodies(path, robot, names, angles, bodies.sample(root))
-    else:
-        names, more = (
-            find_order(path, robot, angles, bodies.sample(root))
-            if bodies
-            else order_without_names(path, robot, count)
-        )
-        notes += more
-    return clip_from_joints(
-        path,
-        robot,
-        time,
-        position,
-        quaternion,
-        names,
-        angles,
-        order=order,
-        option=True,
-        believed=believed,
-        notes=notes,
-        v=_read_velocities(path, robot, arrays, names, columns, count, unit, bodies),
-    )
-
-
-@dataclass(frozen=True)
-class _Bodies:
-    """body_pos_w (T, B, 3), body_quat_w (T, B, 4) as x y z w, and body_names, if there."""
-
-    position: np.ndarray
-    quaternion: np.ndarray
-    names: tuple[str, ...] | None
-    #: Index of the body that the free-flyer moves.
-    root: int
-
-    def sample(self, root: np.ndarray) -> BodySample:
-        return sample_bodies(self.position, self.quaternion, root, self.names)
-
-
-def _read_bodies(path: Path, robot: Robot, arrays: _Arrays, frames: int, order: str) -> _Bodies:
-    position = arrays.numbers("body_pos_w", frames, "B", 3)
-    count = position.shape[1]
-    if count == 0:
-        raise DynacomError(f"{path}: body_pos_w must have at least one body, got none")
-    quaternion = to_xyzw(arrays.numbers("body_quat_w", frames, count, 4), order)
-    norm = np.linalg.norm(quaternion, axis=-1)
-    error = np.abs(norm - 1.0)
-    if error.max() > QUATERNION_ERROR:
-        frame, body = np.unravel_index(np.argmax(error), error.shape)
-        raise DynacomError(
-            f"{path}: body_quat_w must have norm 1, got {norm[frame, body]:.4g} in frame {frame} "
-            f"of body {body}"
-        )
-    names = arrays.texts("body_names", count) if "body_names" in arrays else None
-    base = root_link(robot)
-    return _Bodies(position, quaternion, names, names.index(base) if base in (names or ()) else 0)
-
-
-def _read_velocities(
-    path: Path,
-    robot: Robot,
-    arrays: _Arrays,
-    names: Sequence[str],
-    columns: Sequence[int],
-    count: int,
-    quaternion: np.ndarray,
-    bodies: _Bodies | None,
-) -> np.ndarray | None:
-    """Velocities (T, nv), if there.
-
-    Those of the joints are in joint_vel. Those of the root, linear and angular, in the world's
-    axes, are before them, or are those of its body in body_lin_vel_w and body_ang_vel_w.
-
-    Args:
-        names: of the joints in these columns, among so many joints.
-        quaternion: of the root, (T, 4), x y z w, of norm 1.
-    """
-    if "joint_vel" not in arrays:
-        return None
-    frames = len(quaternion)
-    joint_vel = arrays.numbers("joint_vel", frames, "n")
-    if joint_vel.shape[1] == 6 + count:
-        root, joint_vel = np.split(joint_vel, [6], axis=1)
-    elif joint_vel.shape[1] != count:
-        raise DynacomError(
-            f"{path}: joint_vel must have {count} or 6 + {count} columns, got {joint_vel.shape[1]}"
-        )
-    elif bodies and "body_lin_vel_w" in arrays and "body_ang_vel_w" in arrays:
-        shape = bodies.position.shape
-        root = np.hstack(
-            [
-                arrays.numbers(name, *shape)[:, bodies.root]
-                for name in ("body_lin_vel_w", "body_ang_vel_w")
-            ]
-        )
-    else:
-        return None
-    v = np.zeros((frames, robot.model.nv))
-    to_local = np.swapaxes(rotations(quaternion), 1, 2)
-    v[:, :3] = np.einsum("tij,tj->ti", to_local, root[:, :3])
-    v[:, 3:6] = np.einsum("tij,tj->ti", to_local, root[:, 3:])
-    for name, values in zip(names, joint_vel[:, columns].T, strict=True):
-        v[:, robot.model.joints[robot.model.getJointId(name)].idx_v] = values
-    return v

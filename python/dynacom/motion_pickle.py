@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: BSD-2-Clause
-"""Motions from the pickles of retargeting tools, without running what else a pickle may hold.
+"""Motions from and into the pickles of retargeting tools, running nothing that a pickle may hold.
 
 A pickle is a program: whoever wrote it decides what is called when it is loaded. Here it may call
 what makes NumPy arrays, of numbers and texts, and nothing else; and even these calls go to
 stand-ins of this module, so that no reader of NumPy's sees what the file says.
 """
 
+import io
 import pickle
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,12 @@ from typing import Any
 import numpy as np
 
 from dynacom.errors import DynacomError
-from dynacom.motion_checks import check_finite, make_time, to_xyzw
+from dynacom.motion_change import Change
+from dynacom.motion_checks import check_finite, from_xyzw, make_time, to_xyzw
 from dynacom.motion_clip import Clip, Options, clip_from_joints
-from dynacom.motion_joints import brief, match_joints, order_without_names
+from dynacom.motion_derived import DERIVED, Joints, derived
+from dynacom.motion_joints import brief, configurations, match_joints, order_without_names
+from dynacom.motion_mark import MARK, is_mark, mark_text
 from dynacom.robots import Robot
 
 # What the tools call the same things.
@@ -28,8 +33,15 @@ _KEYS = {
     "joints": ("dof_pos", "dof"),
     "names": ("joint_names", "dof_names"),
 }
-# How files begin that joblib has compressed: zlib, gzip, bz2, xz, lzma, lz4.
-_COMPRESSED = (b"\x78", b"\x1f\x8b", b"BZ", b"\xfd7zXZ", b"]\x00", b"\x04\x22\x4d\x18")
+# How files begin that joblib has compressed, and what with.
+_COMPRESSED = {
+    b"\x78": "zlib",
+    b"\x1f\x8b": "gzip",
+    b"BZ": "bz2",
+    b"\xfd7zXZ": "xz",
+    b"]\x00": "lzma",
+    b"\x04\x22\x4d\x18": "lz4",
+}
 
 
 def read_pickle(path: Path, robot: Robot, options: Options) -> Clip:
@@ -58,51 +70,136 @@ def read_clips(
     content = _load(path, options.trust)
     if _holds_clips(content) and len(content) > 1:
         for name, inner in content.items():
-            yield str(name), partial(_read, path, inner, robot, options)
+            chosen = replace(options, clip=str(name))
+            yield str(name), partial(_read, path, inner, robot, chosen)
     else:
         yield None, partial(_read, path, _choose(path, content, None), robot, options)
 
 
+def write_pickle(change: Change) -> bytes:
+    """The file with a change in one clip: keys, types, shapes and the pickle's protocol are kept.
+
+    Raises:
+        DynacomError: as :func:`write_motion`.
+        OSError: the file cannot be read.
+    """
+    path, options = change.clip.path, change.clip.options
+    content = _load(path, options.trust)
+    clip = _choose(path, content, options.clip)
+    if change.moves:
+        layout = _find_layout(path, clip, change.clip.robot, options)
+        _change_clip(change, clip, layout)
+    clip.pop(MARK, None)
+    if change.mark:
+        clip[MARK] = mark_text()
+    return _dump(path, content)
+
+
 def _read(path: Path, content: Mapping[str, Any], robot: Robot, options: Options) -> Clip:
+    frames = len(_numbers(path, content, "position", 3))
+    rate = _frame_rate(path, content)
+    layout = _find_layout(path, content, robot, options)
+    time, notes = make_time(path, frames, file_fps=rate, fps=options.fps)
+    return clip_from_joints(
+        path,
+        robot,
+        time,
+        layout.position,
+        layout.quaternion,
+        layout.names,
+        layout.joints[:, layout.columns],
+        options,
+        order=layout.order,
+        option=True,
+        notes=[*notes, *layout.notes],
+        exact=is_mark(content.get(MARK)),
+    )
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """What is where."""
+
+    #: (T, 3).
+    position: np.ndarray
+    #: (T, 4), x y z w.
+    quaternion: np.ndarray
+    #: Of the quaternions in the file.
+    order: str
+    #: All of the file, (T, n).
+    joints: np.ndarray
+    #: Which of them are the robot's, and what they are called.
+    columns: list[int]
+    names: Sequence[str]
+    notes: list[str]
+
+
+def _find_layout(path: Path, content: Mapping[str, Any], robot: Robot, options: Options) -> _Layout:
     position = _numbers(path, content, "position", 3)
     quaternion = _numbers(path, content, "quaternion", 4)
     joints = _numbers(path, content, "joints", None)
-    frames = len(position)
+    frames, count = len(position), joints.shape[1]
     for what, values in (("quaternion", quaternion), ("joints", joints)):
         if len(values) != frames:
             name = _find(content, what)
             raise DynacomError(f"{path}: {name} must have {frames} frames, got {len(values)}")
-
-    time, notes = make_time(path, frames, file_fps=_frame_rate(path, content), fps=options.fps)
     if (key := _find(content, "names")) and content[key] is not None:
         try:
             names = np.asarray(content[key], dtype=str).ravel().tolist()
         except (TypeError, ValueError) as error:
             raise DynacomError(f"{path}: {key} must be names ({error})") from error
-        if len(names) != joints.shape[1]:
-            raise DynacomError(
-                f"{path}: {key} must name {joints.shape[1]} joints, got {len(names)}"
-            )
-        known, more = match_joints(path, robot, names)
-        notes += more
-        names, joints = [names[index] for index in known], joints[:, known]
+        if len(names) != count:
+            raise DynacomError(f"{path}: {key} must name {count} joints, got {len(names)}")
+        columns, notes = match_joints(path, robot, names)
+        names = [names[index] for index in columns]
     else:
-        names, more = order_without_names(path, robot, joints.shape[1])
-        notes += more
+        columns = list(range(count))
+        names, notes = order_without_names(path, robot, count)
     order = options.quat or "xyzw"
-    return clip_from_joints(
-        path,
-        robot,
-        time,
-        position,
-        to_xyzw(quaternion, order),
-        names,
-        joints,
-        order=order,
-        option=True,
-        believed=options.quat is not None,
-        notes=notes,
-    )
+    return _Layout(position, to_xyzw(quaternion, order), order, joints, columns, names, notes)
+
+
+def _change_clip(change: Change, clip: dict[str, Any], layout: _Layout) -> None:
+    """Changes a clip in place; what follows from it and cannot be told is taken out of it."""
+    robot, notes = change.clip.robot, change.notes
+    quaternion = change.quaternion(layout.quaternion)
+    joints = layout.joints.copy()
+    joints[:, layout.columns] = change.angles(layout.names, layout.joints[:, layout.columns])
+    after = {
+        _find(clip, "position"): change.position(layout.position),
+        _find(clip, "quaternion"): from_xyzw(quaternion, layout.order),
+        _find(clip, "joints"): joints,
+    }
+    before, step = dict(clip), 0.0
+    for key, values in after.items():
+        clip[key] = _alike(values, clip[key])
+        step = max(step, float(np.spacing(np.abs(np.asarray(clip[key])).max())))
+    change.note_rounding(step)
+    path = change.clip.path
+    position, rounded = _numbers(path, clip, "position", 3), _numbers(path, clip, "quaternion", 4)
+    angles = _numbers(path, clip, "joints", None)[:, layout.columns]
+    q = configurations(robot, position, to_xyzw(rounded, layout.order), layout.names, angles)
+    velocity = change.derivatives(change.as_read(q)).v[change.rows]
+    both = Joints(layout.names, layout.columns, layout.joints, joints)
+    left_out = []
+    for key in [key for key in before if key in DERIVED]:
+        values = derived(key, change, before, both, velocity)
+        if values is None:
+            left_out.append(key)
+            del clip[key]
+        else:
+            clip[key] = _alike(values, clip[key])
+    if left_out:
+        notes.append(f"Left out, as they were those of the motion before: {brief(left_out)}.")
+
+
+def _alike(values: np.ndarray, old: Any) -> Any:
+    """Numbers in the type and the shape of old ones."""
+    values = values.reshape(np.shape(old))
+    if isinstance(old, list | tuple):
+        return values.tolist()
+    is_whole = old.dtype.kind not in "iu" or (values == np.rint(values)).all()
+    return values.astype(old.dtype) if is_whole else values
 
 
 def _load(path: Path, trust: bool) -> Any:
@@ -110,11 +207,11 @@ def _load(path: Path, trust: bool) -> Any:
         beginning = file.read(8)
         file.seek(0)
         try:
-            return _plain(_Unpickler(file, encoding="latin1").load())
+            return _plain(_Unpickler(file, encoding="latin1").load(), {})
         except _Refused as error:
             refused = str(error)
         except Exception as error:  # pickle promises no type for what is no pickle, or a broken one
-            if not beginning.startswith(_COMPRESSED):
+            if not beginning.startswith(tuple(_COMPRESSED)):
                 raise DynacomError(f"{path}: must be a pickle ({error})") from error
             refused = "is compressed, as joblib's files are"
     if not trust:
@@ -134,6 +231,23 @@ def _load(path: Path, trust: bool) -> Any:
         return joblib.load(path)
     except Exception as error:
         raise DynacomError(f"{path}: joblib cannot load it ({error})") from error
+
+
+def _dump(path: Path, content: Any) -> bytes:
+    """As the file there is written: by joblib or not, compressed or not, in the same protocol."""
+    old = path.read_bytes()
+    codec = next((name for start, name in _COMPRESSED.items() if old.startswith(start)), None)
+    try:
+        if codec is None and b"joblib.numpy_pickle" not in old:
+            # From the second on, protocols begin with their number.
+            return pickle.dumps(content, old[1] if old[:1] == b"\x80" else 0)
+        import joblib
+
+        written = io.BytesIO()
+        joblib.dump(content, written, compress=(codec, 3) if codec else 0)
+        return written.getvalue()
+    except Exception as error:  # pickle promises no type for what it does not know
+        raise DynacomError(f"{path}: holds what cannot be written ({error})") from error
 
 
 class _Refused(Exception):
@@ -218,20 +332,28 @@ _ALLOWED = {
 }
 
 
-def _plain(value: Any) -> Any:
-    """With arrays for their stand-ins; dictionaries and lists as deep as motions nest them."""
-    if isinstance(value, _Array):
+def _plain(value: Any, known: dict[int, Any]) -> Any:
+    """With arrays and types for their stand-ins.
+
+    Args:
+        known: what was made of dictionaries and lists so far, by where they are: what is in a
+            pickle may be in it many times, and in itself.
+    """
+    if isinstance(value, _Array | _DType):
         return value.value
+    if not isinstance(value, dict | list | tuple):
+        return value
+    if id(value) in known:
+        return known[id(value)]
+    if isinstance(value, tuple):
+        plain = tuple(_plain(item, known) for item in value)
+        return known.setdefault(id(value), plain)
+    plain = known[id(value)] = type(value)()
     if isinstance(value, dict):
-        return {
-            key: {k: _plain(v) for k, v in inner.items()}
-            if isinstance(inner, dict)
-            else _plain(inner)
-            for key, inner in value.items()
-        }
-    if isinstance(value, list | tuple):
-        return [item.value if isinstance(item, _Array) else item for item in value]
-    return value
+        plain.update((_plain(key, known), _plain(item, known)) for key, item in value.items())
+    else:
+        plain.extend(_plain(item, known) for item in value)
+    return plain
 
 
 def _choose(path: Path, content: Any, clip: str | None) -> Mapping[str, Any]:
