@@ -32,6 +32,7 @@ void exposeCollisionPoints();
 void exposeContactInference();
 void exposeCentroidalFilter();
 void exposeMotionRepair();
+void exposeMotionRepairer();
 void exposeRecordedMotion();
 void exposeMotionAnalysis();
 void exposeMotionVerdict();

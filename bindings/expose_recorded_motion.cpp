@@ -14,10 +14,11 @@ Eigen::MatrixXd toColumns(const bp::object& rows) {
 
 std::shared_ptr<RecordedMotion> makeRecorded(const Eigen::VectorXd& time, const Eigen::MatrixXd& q,
                                              const bp::object& v, const bp::object& a,
-                                             const bp::object& schedule) {
+                                             const bp::object& schedule, bool is_exact) {
   RecordedMotion recorded{time, q.transpose()};
   recorded.v = toColumns(v);
   recorded.a = toColumns(a);
+  recorded.is_exact = is_exact;
   if (!schedule.is_none()) recorded.schedule = bp::extract<ContactSchedule>(schedule)();
   return std::make_shared<RecordedMotion>(std::move(recorded));
 }
@@ -67,14 +68,18 @@ void exposeRecordedMotion() {
       .def("__init__",
            bp::make_constructor(&makeRecorded, bp::default_call_policies(),
                                 (bp::arg("time"), bp::arg("q"), bp::arg("v") = bp::object(),
-                                 bp::arg("a") = bp::object(), bp::arg("schedule") = bp::object())),
+                                 bp::arg("a") = bp::object(), bp::arg("schedule") = bp::object(),
+                                 bp::arg("is_exact") = false)),
            "time: (T,) [s]; q: (T, nq), with quaternions of norm 1; v: (T, nv); a: (T, nv);\n"
-           "schedule: a ContactSchedule. None stands for what was not recorded.")
+           "schedule: a ContactSchedule. None stands for what was not recorded. is_exact:\n"
+           "whether it is known to be free of noise, as what repair has written.")
       .add_property("time", getter(&RecordedMotion::time), "(T,), strictly increasing [s]")
       .add_property("q", &Rows<&RecordedMotion::q>::get, "Configurations, (T, nq)")
       .add_property("v", &getRows<&RecordedMotion::v>, "Velocities, (T, nv), or None")
       .add_property("a", &getRows<&RecordedMotion::a>, "Accelerations, (T, nv), or None")
       .add_property("schedule", &getSchedule, "The ContactSchedule, or None")
+      .def_readonly("is_exact", &RecordedMotion::is_exact,
+                    "Whether it is known to be free of noise")
       .def(PrintVisitor<RecordedMotion>(&writeRecorded))
       .def(CopyVisitor<RecordedMotion>());
 
@@ -92,6 +97,7 @@ void exposeRecordedMotion() {
                     "By how much times were moved to be evenly spaced [s]")
       .def_readonly("is_automatic", &DerivedMotion::is_automatic,
                     "Whether the cut-off, or that there is none, was chosen for the noise")
+      .def_readonly("is_told_exact", &DerivedMotion::is_told_exact, "RecordedMotion.is_exact")
       .def_readonly("noise", &DerivedMotion::noise,
                     "estimateAccelerationNoise of what was recorded; NaN of few frames [g]")
       .def("isExact", &DerivedMotion::isExact,

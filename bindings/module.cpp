@@ -44,6 +44,7 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeContactInference();
   exposeCentroidalFilter();
   exposeMotionRepair();
+  exposeMotionRepairer();
   exposeMotionVerdict();
   exposeMissingSupport();
   exposeTerrain();

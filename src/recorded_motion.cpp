@@ -87,7 +87,7 @@ void markUnsure(const pinocchio::Model& model, pinocchio::Data& data, bool is_fi
 }  // namespace
 
 bool DerivedMotion::isExact() const {
-  if (cutoff == 0.) return !(thinned_noise > kExactNoise);
+  if (cutoff == 0.) return is_told_exact || !(thinned_noise > kExactNoise);
   return is_automatic && thinned_noise <= kExactNoise;
 }
 
@@ -144,7 +144,9 @@ DerivedMotion internal::rederiveMotion(const Derivation& derivation, const Recor
   if (!std::isnan(cutoff) && !(cutoff >= 0. && std::isfinite(cutoff)))
     throwInvalid("cutoff must be finite and >= 0 Hz, got ", cutoff);
   estimateNoise(derivation, time, recorded.q, derived);
-  if (std::isnan(cutoff)) cutoff = derived.is_automatic ? chooseCutoff(derived) : 0.;
+  derived.is_told_exact = recorded.is_exact;
+  if (std::isnan(cutoff))
+    cutoff = derived.is_automatic && !recorded.is_exact ? chooseCutoff(derived) : 0.;
   if (cutoff > 0. && recorded.time.size() > 1) {
     if (!is_even)
       throwInvalid("times must be evenly spaced to be filtered, got steps from ",
@@ -184,6 +186,7 @@ DerivedMotion internal::deriveMotion(const Derivation& derivation, const Recorde
       DerivedMotion derived = {};
       derived.motion = std::move(motion);
       derived.is_recorded = true;
+      derived.is_told_exact = recorded.is_exact;
       derived.mismatch = mismatch;
       derived.frame_rate = findFrameRate(recorded.time);
       const bool is_even = !std::isnan(derived.frame_rate);

@@ -18,6 +18,9 @@ struct DYNACOM_EXPORT RecordedMotion {
   Eigen::MatrixXd v = {}, a = {};
   /// When which contact was active, if that was recorded.
   std::optional<ContactSchedule> schedule = std::nullopt;
+  /// Whether it is known to be free of noise, as what repair has written: kAutomaticCutoff stands
+  /// for no filter then.
+  bool is_exact = false;
 };
 
 /// Up to which DerivativeMismatch recorded velocities and accelerations are used: integrators
@@ -64,6 +67,7 @@ struct DYNACOM_EXPORT DerivedMotion {
   double time_error;
   /// Whether the cut-off, or that there is none, was chosen for the noise below.
   bool is_automatic;
+  bool is_told_exact;  ///< RecordedMotion::is_exact
   /// estimateAccelerationNoise() of all frames as they were recorded, and of as many as make about
   /// kThinnedRate, which is the same where that is not lower; NaN of few frames [g].
   double noise, thinned_noise;
@@ -73,16 +77,16 @@ struct DYNACOM_EXPORT DerivedMotion {
   Eigen::Array<bool, Eigen::Dynamic, 1> unsure;
 
   /// Whether the motion is free of noise, see inferContacts(): it is no noisier than kExactNoise,
-  /// and was not filtered, or for rounding only. Motions of too few frames to tell are, if they
-  /// were not filtered.
+  /// or is told to be, and was not filtered, or for rounding only. Motions of too few frames to
+  /// tell are, if they were not filtered.
   bool isExact() const;
 };
 
 /// The motion that was recorded, if its velocities and accelerations agree with its configurations;
 /// else that of the filtered configurations, see filterConfigurations() and differentiate().
 /// @param cutoff  of the filter [Hz]; 0 for none; kAutomaticCutoff for none where the motion is
-///                exact, kRoundedCutoff where it is so at kThinnedRate, and else kMeasuredCutoff,
-///                or kMeasuredCutoffPart of the frame rate where that is lower
+///                exact, or is told to be, kRoundedCutoff where it is so at kThinnedRate, and else
+///                kMeasuredCutoff, or kMeasuredCutoffPart of the frame rate where that is lower
 /// @throws std::invalid_argument as Motion::validate(); or if frames are to be filtered that are
 ///         not evenly spaced, or with a cut-off that filterConfigurations() does not take
 DYNACOM_EXPORT DerivedMotion deriveMotion(const pinocchio::Model& model,

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynacom/motion_examination.hpp"
+#include "dynacom/motion_repair.hpp"
+
+namespace dynacom {
+
+/// What MotionRepairer needs to know.
+struct DYNACOM_EXPORT RepairerSettings {
+  ExaminationSettings examination = {};
+  /// With `feet` and `joints` off, wrenches only are looked after.
+  RepairSettings repair = {};
+  /// Whether single frames are mended, too, of motions that are feasible as a whole.
+  bool strict = false;
+  /// How often a motion is repaired at most, with the contacts that are found in what came out, on
+  /// each rung.
+  int rounds = 3;
+  /// A motion whose root has to be displaced farther than this in any frame [m], or a joint turned
+  /// by more than the second [rad], is not said to be repaired.
+  double largest_displacement = 0.1, largest_turn = 0.8;
+  /// By which factor time may be stretched where nothing else helps; 1 for not at all.
+  double largest_stretch = 1.;
+
+  /// @throws std::invalid_argument naming the first field out of its range
+  void validate() const;
+};
+
+/// How it went.
+enum class RepairOutcome {
+  Feasible,     ///< The motion was feasible, and is as it was.
+  Repaired,     ///< It was not, and is now: in every frame, without a fault.
+  NotRepaired,  ///< Something is left, see MotionRepair::reasons.
+};
+
+/// "feasible", "repaired" or "not repaired".
+DYNACOM_EXPORT const char* to_string(RepairOutcome outcome);
+
+/// A rung of the ladder, in their order.
+enum class RepairRung {
+  Filter,    ///< what was recorded is noisy, and was filtered
+  Schedule,  ///< contacts, as they are in a motion that is exact
+  Balance,   ///< wrenches within reach
+  Feet,      ///< contacts at rest, level with their ground, and those in the air above it
+  Joints,    ///< positions and velocities within their limits
+  Time,      ///< stretched
+};
+
+/// "filter", "schedule", "balance", "feet", "joints" or "time".
+DYNACOM_EXPORT const char* to_string(RepairRung rung);
+
+/// What a rung has gained. What is measured is for Filter and Schedule the distance to a feasible
+/// motion, root mean square [m], where it is known, else NaN; for Balance the number of frames
+/// whose wrench is not within reach; for Feet the largest speed of a contact along the ground
+/// [m/s]; for Joints how far one is beyond its range at most [rad]; for Time the factor.
+struct RepairStep {
+  RepairRung rung;
+  double before, after;
+  bool is_kept;  ///< whether its motion counts, or that of the rung before
+};
+
+/// Why a motion is not repaired.
+struct RepairReason {
+  std::string code;  ///< what is left: that of a MotionFault, or one of those in MotionRepair
+  double time;       ///< of the frame where it is worst [s]; NaN where it is of no frame
+  std::string text;
+};
+
+/// How much something was changed.
+struct RepairChange {
+  double rms = 0., largest = 0.;
+  Eigen::Index frame = 0;  ///< where it is largest
+  std::string joint;       ///< whose that is, of joints
+};
+
+/// What was made of a recorded motion.
+struct MotionRepair {
+  RepairOutcome outcome;
+  MotionExamination before;  ///< as it was recorded
+  /// What came out, exact unless nothing was changed: its times and configurations, and the
+  /// schedule that was recorded, if there was one; without velocities and accelerations, which are
+  /// those of differentiate().
+  RecordedMotion recorded;
+  MotionExamination after;     ///< of that, without a filter
+  MotionExamination filtered;  ///< as who does not know that it is exact finds it
+  /// Of the configurations, from those of `before` in their tangent spaces, nv × frames.
+  Eigen::MatrixXd change;
+  RepairChange root, joints, com;  ///< displacements [m], changes of joints that turn [rad]
+  /// How many of the judged frames contacts cannot give what they need, by more than 0.001 m g or
+  /// m g m.
+  Eigen::Index missing_before = 0, missing = 0;
+  std::vector<RepairedStance> stances;  ///< of the last rung
+  double stretch = 1.;                  ///< of time
+  std::vector<RepairStep> steps;
+  /// Of `Repaired` and `Feasible` none. Codes are those of faults, and `contact_needed` where
+  /// nothing carries, `out_of_reach` where what carries cannot give what is needed,
+  /// `joint_limits`, `bound` where settings do not allow so much, and `too_short`.
+  std::vector<RepairReason> reasons;
+};
+
+/// Repairs recorded motions of one robot: a ladder, whose rungs are climbed as far as they lead.
+///
+/// A motion is examined as ever. If it is feasible, it stays as it is. Else it is filtered, as for
+/// its verdict, and taken for exact from then on: contacts are found anew, unless that makes it
+/// much farther from a feasible one, as where soles are tilted by mistake. Then wrenches are
+/// brought within reach by repairMotion(), and contacts found once more in what came out, until
+/// both agree; then the same with feet and joints, which counts only if it leaves wrenches within
+/// reach.
+class DYNACOM_EXPORT MotionRepairer {
+ public:
+  /// @param robot  is copied; its root must be a free-flyer
+  /// @throws std::invalid_argument if settings are not valid; NotReadyError before the robot's
+  ///         initialize()
+  explicit MotionRepairer(const DynaCoM& robot, const RepairerSettings& settings = {});
+  MotionRepairer(MotionRepairer&&) noexcept;
+  MotionRepairer& operator=(MotionRepairer&&) noexcept;
+  ~MotionRepairer();
+
+  const RepairerSettings& getSettings() const;
+
+  /// Several threads may call this at once.
+  /// @throws std::invalid_argument as MotionExaminer::examine() and repairMotion()
+  MotionRepair repair(const RecordedMotion& recorded) const;
+
+ private:
+  struct Workspace;
+  std::unique_ptr<Workspace> workspace_;
+};
+
+/// Repairs one recorded motion, see MotionRepairer.
+/// @throws as MotionRepairer
+DYNACOM_EXPORT MotionRepair repairRecordedMotion(const DynaCoM& robot,
+                                                 const RecordedMotion& recorded,
+                                                 const RepairerSettings& settings = {});
+
+}  // namespace dynacom

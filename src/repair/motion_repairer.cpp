@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "dynacom/motion_repairer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <pinocchio/algorithm/joint-configuration.hpp>
+#include <utility>
+
+#include "../check.hpp"
+#include "../nan.hpp"
+#include "joint_limits.hpp"
+#include "motion_linearization.hpp"
+
+namespace dynacom {
+
+using Eigen::Index;
+
+void RepairerSettings::validate() const {
+  examination.validate();
+  repair.validate();
+  internal::requireField(rounds >= 1, "RepairerSettings.rounds", ">= 1", rounds);
+  for (const auto& [name, value] : {std::pair("largest_displacement", largest_displacement),
+                                    std::pair("largest_turn", largest_turn)})
+    internal::requireField(std::isfinite(value) && value > 0.,
+                           internal::concat("RepairerSettings.", name).c_str(), "finite and > 0",
+                           value);
+  internal::requireField(std::isfinite(largest_stretch) && largest_stretch >= 1.,
+                         "RepairerSettings.largest_stretch", "finite and >= 1", largest_stretch);
+}
+
+const char* to_string(RepairOutcome outcome) {
+  switch (outcome) {
+    case RepairOutcome::Feasible:
+      return "feasible";
+    case RepairOutcome::Repaired:
+      return "repaired";
+    case RepairOutcome::NotRepaired:
+      break;
+  }
+  return "not repaired";
+}
+
+const char* to_string(RepairRung rung) {
+  constexpr const char* kNames[] = {"filter", "schedule", "balance", "feet", "joints", "time"};
+  return kNames[static_cast<std::size_t>(rung)];
+}
+
+namespace {
+
+// Contacts may lack so much of what is needed in a frame [m g], [m g m].
+constexpr double kGiven = 1e-3;
+// Contacts of an exact motion count if they leave it no farther from a feasible one than so many
+// times, and so much more [m], than those of a noisy one.
+constexpr double kFarther = 1.5, kFartherBy = 0.003;
+// Joints that are no farther beyond their limits are within them: so much comes of rounding.
+constexpr double kWithinLimits = 1e-6;
+// By which factors time is stretched.
+constexpr double kStretches[] = {1.1, 1.25, 1.5, 2., 3., 4.};
+
+bool isMissing(const MotionExamination& found, Index frame) {
+  const DistributionStatus status = found.analysis.status[static_cast<std::size_t>(frame)];
+  if (status == DistributionStatus::Solved || found.verdict.unsure[frame]) return false;
+  return !(found.analysis.residual.col(frame).norm() <= kGiven * found.statistics.weight);
+}
+
+Index countMissing(const MotionExamination& found) {
+  Index count = 0;
+  for (Index frame = 0; frame < found.analysis.time.size(); ++frame)
+    if (isMissing(found, frame)) ++count;
+  return count;
+}
+
+int rank(MotionOutcome outcome) {
+  return outcome == MotionOutcome::Feasible ? 2 : outcome == MotionOutcome::Repairable ? 1 : 0;
+}
+
+RepairChange summarize(const Eigen::RowVectorXd& sizes) {
+  RepairChange change;
+  change.rms = std::sqrt(sizes.squaredNorm() / double(sizes.size()));
+  change.largest = sizes.maxCoeff(&change.frame);
+  return change;
+}
+
+RepairChange summarizeJoints(const pinocchio::Model& model, const Eigen::MatrixXd& change) {
+  const auto slides = internal::findSliding(model);
+  RepairChange joints;
+  double sum = 0.;
+  Index count = 0;
+  for (pinocchio::JointIndex joint = 2; joint < pinocchio::JointIndex(model.njoints); ++joint)
+    for (Index row = model.idx_vs[joint]; row < model.idx_vs[joint] + model.nvs[joint]; ++row) {
+      if (slides[row]) continue;
+      ++count;
+      const RepairChange own = summarize(change.row(row).cwiseAbs());
+      sum += own.rms * own.rms;
+      if (own.largest <= joints.largest) continue;
+      joints.largest = own.largest;
+      joints.frame = own.frame;
+      joints.joint = model.names[joint];
+    }
+  if (count > 0) joints.rms = std::sqrt(sum / double(count));
+  return joints;
+}
+
+}  // namespace
+
+struct MotionRepairer::Workspace {
+  Workspace(const DynaCoM& given, const RepairerSettings& given_settings)
+      : robot(given),
+        settings(given_settings),
+        recorded(robot, settings.examination),
+        plain(robot, makePlain(settings.examination, settings.examination.cutoff)),
+        exact(robot, makePlain(settings.examination, 0.)) {}
+
+  static ExaminationSettings makePlain(ExaminationSettings settings, double cutoff) {
+    settings.cutoff = cutoff;
+    settings.sensitivity = false;
+    settings.progress = nullptr;
+    settings.distance = true;
+    return settings;
+  }
+
+  const DynaCoM robot;
+  const RepairerSettings settings;
+  const MotionExaminer recorded, plain, exact;
+
+  class Ladder;
+};
+
+// One motion, at one pace.
+class MotionRepairer::Workspace::Ladder {
+ public:
+  Ladder(const Workspace& workspace, const RecordedMotion& recorded, MotionExamination before)
+      : workspace_(workspace), settings_(workspace.settings), recorded_(recorded) {
+    found_.before = std::move(before);
+    found_.missing_before = countMissing(found_.before);
+  }
+
+  MotionRepair climb() {
+    const MotionOutcome outcome = found_.before.verdict.outcome;
+    const bool is_fine =
+        outcome == MotionOutcome::Feasible && !(settings_.strict && found_.missing_before > 0);
+    if (is_fine || outcome == MotionOutcome::Unknown) return leave();
+    const Motion& origin = found_.before.derived.motion;
+    if (found_.before.derived.cutoff > 0.) {
+      const RepairChange moved = summarize((origin.q - recorded_.q).topRows<3>().colwise().norm());
+      found_.steps.push_back({RepairRung::Filter, 0., moved.rms, true});
+    }
+    const std::optional<MotionExamination> contacts = findContacts();
+    Attempt best = balance(contacts ? *contacts : found_.before);
+    if (settings_.repair.feet || settings_.repair.joints) standAndLimit(best);
+    finish(std::move(best));
+    return std::move(found_);
+  }
+
+ private:
+  struct Attempt {
+    RepairedMotion repaired;
+    MotionExamination found;
+    Index missing = 0;
+  };
+
+  const pinocchio::Model& model() const { return workspace_.robot.getModel(); }
+
+  RecordedMotion write(const Eigen::MatrixXd& q) const {
+    return {recorded_.time, q, {}, {}, recorded_.schedule, true};
+  }
+
+  // As it was.
+  MotionRepair leave() {
+    found_.recorded = recorded_;
+    found_.after = found_.filtered = found_.before;
+    found_.change.setZero(model().nv, recorded_.time.size());
+    found_.missing = found_.missing_before;
+    found_.outcome = RepairOutcome::Feasible;
+    if (found_.before.verdict.outcome == MotionOutcome::Unknown) {
+      found_.outcome = RepairOutcome::NotRepaired;
+      found_.reasons.push_back(
+          {"too_short", internal::kNaN, "there are too few frames whose accelerations are known"});
+    }
+    return std::move(found_);
+  }
+
+  // Those of the same motion taken for exact, if they do not make it much harder.
+  std::optional<MotionExamination> findContacts() {
+    if (found_.before.derived.isExact()) return std::nullopt;
+    MotionExamination exact = workspace_.exact.examine(write(found_.before.derived.motion.q));
+    const auto distanceOf = [](const MotionExamination& found) {
+      return found.distance && found.distance->converged ? found.distance->rms : internal::kNaN;
+    };
+    const double before = distanceOf(found_.before), after = distanceOf(exact);
+    const bool is_kept = after <= kFarther * before + kFartherBy;
+    found_.steps.push_back({RepairRung::Schedule, before, after, is_kept});
+    if (!is_kept) return std::nullopt;
+    return exact;
+  }
+
+  Attempt balance(const MotionExamination& contacts) {
+    RepairSettings settings = settings_.repair;
+    settings.feet = settings.joints = false;
+    Attempt attempt = repeat(settings, contacts, found_.before.derived.motion.q);
+    found_.steps.push_back(
+        {RepairRung::Balance, double(found_.missing_before), double(attempt.missing), true});
+    return attempt;
+  }
+
+  // Feet and joints, if something is wrong with them, and no wrench is lost for it.
+  void standAndLimit(Attempt& best) {
+    const double limits = findExcess(best.repaired.motion.q);
+    const bool are_limits_wrong = settings_.repair.joints && limits > kWithinLimits;
+    const bool are_feet_wrong = settings_.repair.feet && !best.found.verdict.isFeasible();
+    if (!are_limits_wrong && !are_feet_wrong) return;
+    Attempt attempt = repeat(settings_.repair, best.found, best.repaired.motion.q);
+    const bool is_kept = attempt.missing <= best.missing && isSmall(attempt.repaired.change) &&
+                         rank(attempt.found.verdict.outcome) >= rank(best.found.verdict.outcome);
+    if (settings_.repair.feet)
+      found_.steps.push_back(
+          {RepairRung::Feet, findSlide(best.found), findSlide(attempt.found), is_kept});
+    if (settings_.repair.joints)
+      found_.steps.push_back(
+          {RepairRung::Joints, limits, findExcess(attempt.repaired.motion.q), is_kept});
+    if (is_kept) best = std::move(attempt);
+  }
+
+  static double findSlide(const MotionExamination& found) {
+    return found.verdict[MotionFault::FootSliding].worst;
+  }
+
+  double findExcess(const Eigen::MatrixXd& q) const {
+    double largest = 0.;
+    for (const internal::LimitedJoint& joint : internal::listLimits(model(), 0., 0.))
+      for (Index frame = 0; frame < q.cols(); ++frame)
+        for (const internal::LimitKind kind : internal::kLimitKinds)
+          largest = std::max(largest, measureExcess(joint, kind, recorded_.time, q, frame));
+    return largest;
+  }
+
+  bool isSmall(const Eigen::MatrixXd& change) const {
+    return change.topRows<3>().colwise().norm().maxCoeff() <= settings_.largest_displacement &&
+           summarizeJoints(model(), change).largest <= settings_.largest_turn;
+  }
+
+  // Repairs with the contacts that were found, and with those that are found then, until they give
+  // all that is needed.
+  Attempt repeat(const RepairSettings& settings, const MotionExamination& contacts,
+                 const Eigen::MatrixXd& start) const {
+    Attempt best;
+    Attempt last;
+    for (int round = 0; round < settings_.rounds; ++round) {
+      const MotionExamination& used = round == 0 ? contacts : last.found;
+      const PartRobot parts = splitContacts(workspace_.robot, used.links);
+      RepairGround ground;
+      if (settings.feet) ground = findRepairGround(parts.parts, used.inference, recorded_.time);
+      RepairedMotion repaired =
+          repairMotion(parts, found_.before.derived.motion, used.inference.schedule, settings, {},
+                       ground, round == 0 ? start : last.repaired.motion.q);
+      MotionExamination found = workspace_.exact.examine(write(repaired.motion.q));
+      const Index missing = countMissing(found);
+      last = {std::move(repaired), std::move(found), missing};
+      if (round == 0 || isBetter(last, best)) best = last;
+      if (last.missing == 0 && (!settings.feet || last.found.verdict.isFeasible())) break;
+    }
+    return best;
+  }
+
+  static bool isBetter(const Attempt& one, const Attempt& other) {
+    if (one.missing != other.missing) return one.missing < other.missing;
+    return rank(one.found.verdict.outcome) > rank(other.found.verdict.outcome);
+  }
+
+  void finish(Attempt attempt) {
+    found_.recorded = write(attempt.repaired.motion.q);
+    found_.after = std::move(attempt.found);
+    found_.missing = attempt.missing;
+    found_.stances = std::move(attempt.repaired.stances);
+    found_.change = std::move(attempt.repaired.change);
+    found_.root = summarize(found_.change.topRows<3>().colwise().norm());
+    found_.joints = summarizeJoints(model(), found_.change);
+    found_.com =
+        summarize((found_.after.analysis.com - found_.before.analysis.com).colwise().norm());
+    RecordedMotion unmarked = found_.recorded;
+    unmarked.is_exact = false;
+    found_.filtered = workspace_.plain.examine(unmarked);
+    explain();
+    found_.outcome = found_.reasons.empty() ? RepairOutcome::Repaired : RepairOutcome::NotRepaired;
+  }
+
+  void explain() {
+    explainMissing();
+    for (std::size_t k = 0; k < kMotionFaults; ++k) {
+      const auto fault = static_cast<MotionFault>(k);
+      const MotionFinding& finding = found_.after.verdict[fault];
+      if (!finding.holds) continue;
+      std::string text =
+          internal::concat(getMeaning(fault), ": up to ", finding.worst, " ", getUnit(fault));
+      if (!finding.subject.empty()) text += " (" + finding.subject + ")";
+      found_.reasons.push_back({to_string(fault), finding.time, text});
+    }
+    const double excess = findExcess(found_.recorded.q);
+    if (settings_.repair.joints && excess > kWithinLimits)
+      found_.reasons.push_back(
+          {"joint_limits", internal::kNaN,
+           internal::concat("joints are beyond their limits, by up to ", excess, " rad")});
+    if (!isSmall(found_.change))
+      found_.reasons.push_back(
+          {"bound", recorded_.time[found_.root.frame],
+           internal::concat("the root has to be displaced by up to ", found_.root.largest,
+                            " m, and ", found_.joints.joint, " turned by up to ",
+                            found_.joints.largest, " rad: settings allow ",
+                            settings_.largest_displacement, " m and ", settings_.largest_turn,
+                            " rad")});
+  }
+
+  // Frames whose wrench is still out of reach, where something carries, and where nothing does.
+  void explainMissing() {
+    const MotionExamination& found = found_.after;
+    for (const bool is_flight : {true, false}) {
+      Index count = 0, worst = 0;
+      double largest = 0.;
+      for (Index frame = 0; frame < recorded_.time.size(); ++frame) {
+        if (!isMissing(found, frame) ||
+            found.inference.schedule.active.col(frame).any() == is_flight)
+          continue;
+        ++count;
+        const double size = found.analysis.residual.col(frame).norm() / found.statistics.weight;
+        if (size <= largest) continue;
+        largest = size;
+        worst = frame;
+      }
+      if (count == 0) continue;
+      const bool is_end = is_flight && (worst == 0 || worst == recorded_.time.size() - 1);
+      found_.reasons.push_back(
+          {is_flight ? "contact_needed" : "out_of_reach", recorded_.time[worst],
+           internal::concat(is_flight ? "nothing carries, and something would have to"
+                                      : "what carries cannot give what is needed",
+                            ", in ", count, " frames", is_end ? ", at an end of the clip" : "",
+                            ": ", largest, " m g are missing")});
+    }
+  }
+
+  const Workspace& workspace_;
+  const RepairerSettings& settings_;
+  const RecordedMotion& recorded_;
+  MotionRepair found_ = {};
+};
+
+MotionRepairer::MotionRepairer(const DynaCoM& robot, const RepairerSettings& settings) {
+  settings.validate();
+  workspace_ = std::make_unique<Workspace>(robot, settings);
+}
+
+MotionRepairer::~MotionRepairer() = default;
+MotionRepairer::MotionRepairer(MotionRepairer&&) noexcept = default;
+MotionRepairer& MotionRepairer::operator=(MotionRepairer&&) noexcept = default;
+
+const RepairerSettings& MotionRepairer::getSettings() const { return workspace_->settings; }
+
+MotionRepair MotionRepairer::repair(const RecordedMotion& recorded) const {
+  const Workspace& workspace = *workspace_;
+  MotionExamination before = workspace.recorded.examine(recorded);
+  MotionRepair found = Workspace::Ladder(workspace, recorded, before).climb();
+  const double largest = workspace.settings.largest_stretch;
+  for (const double factor : kStretches) {
+    if (found.outcome != RepairOutcome::NotRepaired || factor > largest ||
+        before.verdict.outcome == MotionOutcome::Unknown)
+      break;
+    RecordedMotion slower = {recorded.time,     recorded.q,       {}, {},
+                             recorded.schedule, recorded.is_exact};
+    slower.time = recorded.time[0] + factor * (recorded.time.array() - recorded.time[0]);
+    MotionRepair other =
+        Workspace::Ladder(workspace, slower, workspace.plain.examine(slower)).climb();
+    const bool is_kept = other.outcome != RepairOutcome::NotRepaired;
+    if (!is_kept) continue;
+    other.before = std::move(before);
+    other.missing_before = found.missing_before;
+    other.stretch = factor;
+    other.outcome = RepairOutcome::Repaired;
+    other.recorded.v.resize(0, 0);
+    other.recorded.a.resize(0, 0);
+    other.steps.insert(other.steps.begin(), {RepairRung::Time, 1., factor, true});
+    return other;
+  }
+  return found;
+}
+
+MotionRepair repairRecordedMotion(const DynaCoM& robot, const RecordedMotion& recorded,
+                                  const RepairerSettings& settings) {
+  return MotionRepairer(robot, settings).repair(recorded);
+}
+
+}  // namespace dynacom
