@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from playwright.sync_api import Page
 
 from browser import difference, open_page, open_scene, settled_picture, wait_for
-from dynacom import DynacomError, page
+from dynacom import DynacomError, page_html
 from dynacom.page import write_page
 from dynacom.robots import Robot
 from helpers import WALKS
@@ -388,11 +388,11 @@ def test_without_plotly(talos, hurried, tmp_path, monkeypatch):
     ],
 )
 def test_numbers(value, text):
-    assert page._number(value, "kg").replace("&nbsp;", " ") == text
+    assert page_html.number_text(value, "kg").replace("&nbsp;", " ") == text
 
 
 @pytest.mark.parametrize(
     ("share", "text"), [(0.0, "0.0 %"), (0.0004, "&lt; 0.1 %"), (0.05, "5.0 %"), (1.0, "100.0 %")]
 )
 def test_shares(share, text):
-    assert page._percent(share).replace("&nbsp;", " ") == text
+    assert page_html.percent_text(share).replace("&nbsp;", " ") == text

@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import ConvexHull
 
 from browser import open_page, wait_for
-from dynacom import ContactSchedule, DynacomError, Motion, scene
+from dynacom import ContactSchedule, DynacomError, Motion, scene, scene_robot
 from dynacom.robots import Robot
 from helpers import robots_folder
 from report_case import Arrays, Summary, report, walk_report
@@ -263,7 +263,7 @@ def visuals_of(urdf: str) -> tuple[pin.Model, pin.GeometryModel]:
 def test_meshes_with_y_up():
     """iCub's legs, whose meshes' files say so and mean it, are as long as from joint to joint."""
     model, visuals = visuals_of("icub_description/robots/icub.urdf")
-    scene.turn_upright(model, visuals)
+    scene_robot.turn_upright(model, visuals)
     data, placements = model.createData(), visuals.createData()
     pin.updateGeometryPlacements(model, data, visuals, placements, pin.neutral(model))
     for link, upper, lower in (
@@ -293,7 +293,7 @@ def test_meshes_that_stay(urdf):
     """Those of the one say so, too, but are not meant to be turned; the other's do not."""
     model, visuals = visuals_of(urdf)
     before = [visual.placement.copy() for visual in visuals.geometryObjects]
-    scene.turn_upright(model, visuals)
+    scene_robot.turn_upright(model, visuals)
     assert [visual.placement for visual in visuals.geometryObjects] == before
 
 
