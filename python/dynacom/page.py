@@ -21,6 +21,8 @@ from dynacom.distance import distance_text
 from dynacom.errors import DynacomError
 from dynacom.motion_report import TOO_SHORT
 from dynacom.page_html import number_text, percent_text, table, time_button
+from dynacom.page_repair import before_points, change_columns, repair_section, shown_before
+from dynacom.repair_change import Before
 from dynacom.robots import Robot
 
 
@@ -31,6 +33,7 @@ def write_page(
     arrays: Mapping[str, np.ndarray],
     summary: Mapping[str, Any],
     *,
+    before: Before | None = None,
     scene_rate: float = 15.0,
 ) -> None:
     """Writes a report's page.
@@ -39,22 +42,31 @@ def write_page(
         path: of the HTML file.
         q: (T, nq), the motion's configurations.
         arrays: of the report, a row per frame.
-        summary: of the report.
+        summary: of the report. A `repair` in it has a section of its own, see docs/repair.md.
+        before: the motion before repair, to be compared in scene and plots. Where the summary says
+            that nothing was changed, it is not asked.
         scene_rate: frames per second of the 3D scene, at most; plots have all frames.
 
     Raises:
         DynacomError: plotly is not installed. Without viser, or without the robot's meshes, there
             is a page, which says what it lacks.
         OSError: the file cannot be written.
+        ValueError: the motion before has another size.
     """
+    before = shown_before(before, summary)
     plotly = _plotly()
     recording, note = None, None
     try:
-        recording = scene.record(robot, q, arrays, summary, scene_rate)
+        recording = scene.record(robot, q, arrays, summary, scene_rate, before=before)
         note = recording.note
     except DynacomError as error:
         note = f"There is no 3D scene: {error}."
+    points = _points(summary)
+    if before is not None:
+        points = before_points(points)
     columns = _columns(robot, arrays, summary)
+    if before is not None:
+        columns |= change_columns(robot, q, arrays, before)
     data = {
         "columns": list(columns),
         "statuses": _statuses(arrays),
@@ -68,24 +80,27 @@ def write_page(
             }
             for number, name in enumerate([*robot.contacts, *summary["bodies"]])
         ],
-        "points": _points(summary),
+        "points": points,
         "colors": {name: _css(color) for name, color in scene.COLORS.items()},
         "thresholds": {reason["code"]: reason["threshold"] for reason in summary["reasons"]},
         "windows": summary["windows"],
-        "sceneTimes": [] if recording is None else recording.times.round(6).tolist(),
+        "sceneTimes": _times(recording and recording.times),
+        "sceneTimesWithoutGhost": _times(recording and recording.times_without_ghost),
     }
     page = Template(_read("page.html")).substitute(
         title=f"{escape(summary['clip'])}: {escape(summary['verdict'])}",
         style=_read("page.css"),
         script=_read("page.js"),
         head=_head(summary),
+        repair=repair_section(summary, before),
         verdict=_verdict(summary),
         notes=_notes([*summary["notes"], *([note] if note else [])]),
         contacts=_contacts(robot, summary),
         sensitivity=_sensitivity(summary),
         measured=_measured(summary),
-        key=_key(robot, summary),
+        key=_key(robot, summary, points) + ("" if before is None else _GHOST),
         dashed="; dashed: the file's" if any(c["measured"] for c in data["contacts"]) else "",
+        change_class="none" if before is None else "",
         distance_class="" if summary["distance"] else "none",
         scene_class="" if recording else "none",
         data=_json(data),
@@ -128,8 +143,19 @@ def _json(value: Any) -> str:
     return text
 
 
+def _times(times: np.ndarray | None) -> list[float]:
+    return [] if times is None else times.round(6).tolist()
+
+
 def _css(color: tuple[int, int, int]) -> str:
     return "#{:02x}{:02x}{:02x}".format(*color)
+
+
+# What shows and hides the ghost.
+_GHOST = (
+    '<label><input type="checkbox" id="ghost" checked> '
+    f'<i style="background: {_css(scene.COLORS["ghost"])}"></i> ghost: before repair</label>'
+)
 
 
 # ---- What is plotted ----
@@ -289,10 +315,10 @@ def _dot(color: tuple[int, int, int]) -> str:
     return f'<i style="background: {_css(color)}"></i>'
 
 
-def _key(robot: Robot, summary: Mapping[str, Any]) -> str:
+def _key(robot: Robot, summary: Mapping[str, Any], points: Mapping[str, str]) -> str:
     """What the scene's colours mean."""
-    points = _points(summary) | {"support": "support"}
     colors = {title: scene.COLORS[name] for name, title in points.items()}
+    colors["support"] = scene.COLORS["support"]
     for number, name in enumerate([*robot.contacts, *summary["bodies"]]):
         colors[f"force on {name}"] = scene.contact_color(number)
     return "".join(f"<span>{_dot(color)} {escape(text)}</span>" for text, color in colors.items())

@@ -22,6 +22,12 @@ class Before:
     #: Of its report: MotionReport.summary.
     summary: Mapping[str, Any]
 
+    def __post_init__(self) -> None:
+        """Raises ValueError where the arrays have another number of frames."""
+        frames = len(self.arrays["time"])
+        if len(self.q) != frames:
+            raise ValueError(f"Before.q must have {frames} frames as its arrays, got {len(self.q)}")
+
 
 def change_arrays(robot: Robot, before: Before, q: np.ndarray) -> dict[str, np.ndarray]:
     """By how much configurations differ, frame by frame, by Pinocchio's ``difference``.
