@@ -132,12 +132,15 @@
     const limit = data.thresholds[name];
     const more = { trace: { fill: "tozeroy", fillcolor: `${color}1f` } };
     const shapes = limit === undefined ? [] : [level(limit, color)];
-    const traces = [line(title, column(name), color, more)];
-    const before = column(`${name}_before`);
-    if (before === undefined) return [traces, overTime(shapes, { showlegend: false })];
-    const pale = data.colors.ghost;
-    const trace = { fill: "tozeroy", fillcolor: `${pale}1f` };
-    return [[line("before repair", before, pale, { trace }), ...traces], overTime(shapes)];
+    const before = column(`${name}_before`); // repair
+    if (before === undefined)
+      return [[line(title, column(name), color, more)], overTime(shapes, { showlegend: false })];
+    const { ghost: blue } = data.colors;
+    const traces = [
+      line("before", before, blue, { trace: { fill: "tozeroy", fillcolor: `${blue}1f` } }),
+      line("after", column(name), color, more),
+    ];
+    return [traces, overTime(shapes)];
   }
 
   // The first and the last frame of each stretch in which something holds.
@@ -319,7 +322,7 @@
         name: title,
         mode: "lines",
         line: { color: data.colors[name], width: 1, dash: dash(name) },
-        opacity: isBefore(name) ? 0.7 : 0.3,
+        opacity: isBefore(name) ? 0.45 : 0.3,
         hovertemplate: "%{x:.3f}, %{y:.3f}",
         legendgroup: name,
         showlegend: false,

@@ -86,15 +86,16 @@ def repair_section(summary: Mapping[str, Any], before: Before | None) -> str:
     outcome = repair.get("outcome")
     unknown = ("unknown", "Repair", escape(outcome or ""))
     kind, title, text = _OUTCOMES.get(outcome, unknown)
-    sentences = (text, "" if before is None else _GHOST, _file_text(repair))
+    sentences = text if before is None else f"{text} {_GHOST}"
+    details = " ".join(filter(None, (_stances(repair), _file_text(repair))))
     parts = [
         f'<section class="repair {kind}"><h2>{title}</h2>',
-        f'<p class="caption">{" ".join(filter(None, sentences))}</p>',
+        f'<p class="caption">{sentences}</p>',
         '<div class="tables">',
         _table_of(("", "Before", "After"), _compared(repair)),
         _table_of(("Changed", "RMS", "Largest", "at"), _changes(repair)),
         "</div>",
-        _stances(repair),
+        f'<p class="caption">{details}</p>' if details else "",
         _reasons(repair.get("reasons") or []),
         _rungs(repair.get("rungs") or []),
         "</section>",
@@ -126,14 +127,14 @@ def _compared(repair: Mapping[str, Any]) -> Iterator[Sequence[str]]:
     verdicts = [_verdict(repair, ending) for ending in ("_before", "", "_filtered")]
     rows = [
         ("Verdict", *verdicts[:2]),
-        ("Verdict after the default filter", None, verdicts[2]),
+        ("Verdict, filtered", None, verdicts[2]),
         *_pair("Missing force, RMS", before, after, "force_rms", _plain("m g")),
         *_pair("Missing moment, RMS", before, after, "torque_rms", _plain("m g·m")),
         *_pair("Frames out of reach", before, after, "frames", str),
     ]
     for title, key, unit in (
-        ("Fastest slide of a standing foot", "largest_speed", "mm/s"),
-        ("Farthest drift of a standing foot", "largest_drift", "mm"),
+        ("Stance, largest speed", "largest_speed", "mm/s"),
+        ("Stance, largest drift", "largest_drift", "mm"),
     ):
         values = {"before": stances.get(f"{key}_before")}, {"before": stances.get(key)}
         rows += _pair(title, *values, "before", _millimetres(unit))
@@ -193,7 +194,7 @@ def _stances(repair: Mapping[str, Any]) -> str:
     stances = repair.get("stances") or {}
     if stances.get("count") is None or stances.get("held") is None:
         return ""
-    return f'<p class="caption">{stances["held"]} of {stances["count"]} stances are held still.</p>'
+    return f"{stances['held']} of {stances['count']} stances are held still."
 
 
 def _reasons(reasons: Sequence[Mapping[str, Any]]) -> str:

@@ -411,7 +411,6 @@ class Scene:
                 places,
                 COLORS[name],
                 thickness=0.3 * radius,
-                dashed=False,
             )
             for name, places in self._places(self._arrays).items()
         ]

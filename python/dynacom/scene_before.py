@@ -26,7 +26,6 @@ class MovingPath:
         color: tuple[int, int, int],
         *,
         thickness: float,
-        dashed: bool,
     ) -> None:
         """Draws nothing yet.
 
@@ -37,14 +36,11 @@ class MovingPath:
             points: (T, 3) [m]; the path has holes where they are not finite.
             color: red, green, blue.
             thickness: of the line [m].
-            dashed: whether every other piece of the line is left out.
         """
         step = max(1, round(_STEP / np.diff(time).mean())) if len(time) > 1 else 1
         time_there, points = time[::step], points[::step]
         pieces = np.stack([points[:-1], points[1:]], axis=1)
         drawn = np.isfinite(pieces).all(axis=(1, 2))
-        if dashed:
-            drawn[1::2] = False
         self._pieces = pieces[drawn].astype(np.float32)
         # Those between the first and the last moment.
         begins, ends = time_there[:-1][drawn], time_there[1:][drawn]
@@ -106,8 +102,7 @@ class Ghost:
                 before.arrays["time"],
                 places,
                 colors[name],
-                thickness=0.4 * radius,
-                dashed=True,
+                thickness=0.2 * radius,
             )
             for name, places in points.items()
         ]

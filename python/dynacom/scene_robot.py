@@ -13,7 +13,7 @@ from dynacom.robots import Robot
 _OPACITY = 0.4
 _LINES = (90, 90, 90)
 # Of what is drawn in one colour: it stands beside another robot, which it must not hide.
-_FAINT = 0.3
+_FAINT = 0.2
 
 
 def draw_robot(
