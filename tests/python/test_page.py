@@ -489,10 +489,10 @@ def test_what_repair_has_changed_is_drawn(talos, repaired, tmp_path, monkeypatch
         # They can be told apart, in the legend, too.
         lines = tab.evaluate(
             "document.getElementById('above').data.filter(({name}) => /^Co[MP]/.test(name))"
-            ".map(({line}) => line ? line.color + line.dash : null)"
+            ".filter(({line}) => line).map(({name, line}) => [name, line.color, line.dash])"
         )
-        drawn = [line for line in lines if line is not None]
-        assert len(drawn) == len(set(drawn)) == 4
+        assert len({color for _, color, _ in lines}) == len(lines) == 4
+        assert {name for name, _, dash in lines if dash == "dot"} == {"CoM before", "CoP before"}
         # Times in the section lead there.
         tab.locator(".repair").get_by_role("button").first.click()
         wait_for(lambda: abs(clock(tab) - 1.25) < 0.01, "the clock")
