@@ -44,8 +44,9 @@
   const rowNames = [...data.contacts.map(({ name }) => name), ...data.statuses];
   const LEFT = 18 + 6.5 * Math.min(Math.max(...rowNames.map((name) => name.length)), LONGEST);
   const AXIS = { zeroline: false, gridcolor: "#eceff2", linecolor: "#dfe3e7", automargin: false };
-  // Above there is a legend, with about five names in a row.
-  const ABOVE = 12 + 20 * Math.ceil((data.contacts.length + 1) / 5);
+  // Above there is a legend, with about five names in a row; with four where a plot is narrow.
+  const legendHeight = (names, inRow) => 12 + 20 * Math.ceil(names / inRow);
+  const ABOVE = legendHeight(data.contacts.length + 1, 5);
   const MARGIN = { l: 0, r: 12, t: ABOVE, b: 28, autoexpand: false };
   const CONFIG = { displayModeBar: false, responsive: true, doubleClick: "reset" };
   const first = time[0];
@@ -131,7 +132,15 @@
     const limit = data.thresholds[name];
     const more = { trace: { fill: "tozeroy", fillcolor: `${color}1f` } };
     const shapes = limit === undefined ? [] : [level(limit, color)];
-    return [[line(title, column(name), color, more)], overTime(shapes, { showlegend: false })];
+    const before = column(`${name}_before`); // repair
+    if (before === undefined)
+      return [[line(title, column(name), color, more)], overTime(shapes, { showlegend: false })];
+    const { ghost: blue } = data.colors;
+    const traces = [
+      line("before", before, blue, { trace: { fill: "tozeroy", fillcolor: `${blue}1f` } }),
+      line("after", column(name), color, more),
+    ];
+    return [traces, overTime(shapes)];
   }
 
   // The first and the last frame of each stretch in which something holds.
@@ -213,7 +222,13 @@
     return [traces, overTime([], more)];
   }
 
+  const CHANGES = [
+    ["change_root", "root"],
+    ["change_com", "CoM"],
+    ["change_joints", "joint"],
+  ].filter(([name]) => columns.has(name));
   const drawn = new Map([
+    ...CHANGES.map(([name, title]) => [name, drawFilled(name, title, "#46505a")]),
     ["forces", drawForces()],
     ["friction", drawFriction()],
     ["residual_force", drawFilled("residual_force", "residual", "#b3261e")],
@@ -232,6 +247,8 @@
   const FAINT_PATHS = Object.keys(POINTS).map((_, index) => data.contacts.length + index);
   const NOW = data.contacts.length + FAINT_PATHS.length; // the first of those that show one frame
 
+  const isBefore = (name) => name.endsWith("_before"); // repair: its paths are dotted
+  const dash = (name) => (isBefore(name) ? "dot" : undefined);
   const path = (name) => [column(`${name}_x`), column(`${name}_y`)];
   // The faint paths, which are drawn anew at every step: of some frames, where there are many.
   const FAINT = 5000;
@@ -304,8 +321,8 @@
         y: ys[index],
         name: title,
         mode: "lines",
-        line: { color: data.colors[name], width: 1 },
-        opacity: 0.3,
+        line: { color: data.colors[name], width: 1, dash: dash(name) },
+        opacity: isBefore(name) ? 0.45 : 0.3,
         hovertemplate: "%{x:.3f}, %{y:.3f}",
         legendgroup: name,
         showlegend: false,
@@ -326,7 +343,7 @@
         {
           ...empty,
           mode: "lines",
-          line: { color, width: 2 },
+          line: { color, width: 2, dash: dash(name) },
           legendgroup: name,
           showlegend: false,
         },
@@ -344,7 +361,7 @@
       layout({
         hovermode: "closest",
         dragmode: "pan",
-        margin: { ...MARGIN, l: 48 },
+        margin: { ...MARGIN, l: 48, t: Math.max(ABOVE, legendHeight(Object.keys(POINTS).length, 4)) },
         xaxis: { ...AXIS, ...range(0), scaleanchor: "y" },
         yaxis: { ...AXIS, ...range(1) },
       }),
@@ -391,19 +408,25 @@
 
   // ---- The scene ----
 
+  // Frames are recorded twice, one after the other: with the ghost of the motion before repair, and
+  // without it. There is no such box where there is no ghost.
+  const ghost = element("ghost");
+  if (ghost !== null) ghost.addEventListener("change", () => scene.show(now));
+
   // viser's page has no way to be told a time but its field for it: it is shown only here.
   const scene = {
     field: null,
-    shown: -1,
+    shown: -1, // its time
     times: data.sceneTimes,
     show(frame) {
       if (this.field === null) return;
-      const index = nearest(this.times, time[frame] - first);
-      if (index === this.shown) return;
-      this.shown = index;
+      const times = ghost === null || ghost.checked ? this.times : data.sceneTimesWithoutGhost;
+      const moment = times[nearest(this.times, time[frame] - first)];
+      if (moment === this.shown) return;
+      this.shown = moment;
       // A little later than the frame, and with more digits than the field shows: a text that it
       // has already would be no change.
-      const text = (this.times[index] + 1e-4).toFixed(5);
+      const text = (moment + 1e-4).toFixed(5);
       const { HTMLInputElement, Event } = this.field.ownerDocument.defaultView;
       const value = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value");
       value.set.call(this.field, text);
@@ -520,14 +543,15 @@
   window.addEventListener("beforeprint", () => fit(true));
   window.addEventListener("afterprint", () => fit(false));
 
-  document.querySelectorAll(".reasons tbody tr").forEach((row) => {
-    const button = row.querySelector("button");
-    if (button === null) return;
-    row.addEventListener("click", () => {
-      pause();
-      goTo(Number(button.dataset.time));
-      document.querySelector(".pair").scrollIntoView({ block: "nearest", behavior: "smooth" });
-    });
+  function visitTime(button) {
+    pause();
+    goTo(Number(button.dataset.time));
+    document.querySelector(".pair").scrollIntoView({ block: "nearest", behavior: "smooth" });
+  }
+  document.querySelectorAll("button.time").forEach((button) => {
+    // All of a reason's row leads to its time.
+    const place = button.closest(".reasons tbody tr") ?? button;
+    place.addEventListener("click", () => visitTime(button));
   });
 
   // ---- Playing ----

@@ -8,7 +8,7 @@ plots and scene through time together.
 import base64
 import gzip
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from string import Template
@@ -20,6 +20,9 @@ from dynacom import scene
 from dynacom.distance import distance_text
 from dynacom.errors import DynacomError
 from dynacom.motion_report import TOO_SHORT
+from dynacom.page_html import number_text, percent_text, table, time_button
+from dynacom.page_repair import before_points, change_columns, repair_section, shown_before
+from dynacom.repair_change import Before
 from dynacom.robots import Robot
 
 
@@ -30,6 +33,7 @@ def write_page(
     arrays: Mapping[str, np.ndarray],
     summary: Mapping[str, Any],
     *,
+    before: Before | None = None,
     scene_rate: float = 15.0,
 ) -> None:
     """Writes a report's page.
@@ -38,22 +42,31 @@ def write_page(
         path: of the HTML file.
         q: (T, nq), the motion's configurations.
         arrays: of the report, a row per frame.
-        summary: of the report.
+        summary: of the report. A `repair` in it has a section of its own, see docs/repair.md.
+        before: the motion before repair, to be compared in scene and plots. Where the summary says
+            that nothing was changed, it is not asked.
         scene_rate: frames per second of the 3D scene, at most; plots have all frames.
 
     Raises:
         DynacomError: plotly is not installed. Without viser, or without the robot's meshes, there
             is a page, which says what it lacks.
         OSError: the file cannot be written.
+        ValueError: the motion before has another size.
     """
+    before = shown_before(before, summary)
     plotly = _plotly()
     recording, note = None, None
     try:
-        recording = scene.record(robot, q, arrays, summary, scene_rate)
+        recording = scene.record(robot, q, arrays, summary, scene_rate, before=before)
         note = recording.note
     except DynacomError as error:
         note = f"There is no 3D scene: {error}."
+    points = _points(summary)
+    if before is not None:
+        points = before_points(points)
     columns = _columns(robot, arrays, summary)
+    if before is not None:
+        columns |= change_columns(robot, q, arrays, before)
     data = {
         "columns": list(columns),
         "statuses": _statuses(arrays),
@@ -67,24 +80,27 @@ def write_page(
             }
             for number, name in enumerate([*robot.contacts, *summary["bodies"]])
         ],
-        "points": _points(summary),
+        "points": points,
         "colors": {name: _css(color) for name, color in scene.COLORS.items()},
         "thresholds": {reason["code"]: reason["threshold"] for reason in summary["reasons"]},
         "windows": summary["windows"],
-        "sceneTimes": [] if recording is None else recording.times.round(6).tolist(),
+        "sceneTimes": _times(recording and recording.times),
+        "sceneTimesWithoutGhost": _times(recording and recording.times_without_ghost),
     }
     page = Template(_read("page.html")).substitute(
         title=f"{escape(summary['clip'])}: {escape(summary['verdict'])}",
         style=_read("page.css"),
         script=_read("page.js"),
         head=_head(summary),
+        repair=repair_section(summary, before),
         verdict=_verdict(summary),
         notes=_notes([*summary["notes"], *([note] if note else [])]),
         contacts=_contacts(robot, summary),
         sensitivity=_sensitivity(summary),
         measured=_measured(summary),
-        key=_key(robot, summary),
+        key=_key(robot, summary, points) + ("" if before is None else _GHOST),
         dashed="; dashed: the file's" if any(c["measured"] for c in data["contacts"]) else "",
+        change_class="none" if before is None else "",
         distance_class="" if summary["distance"] else "none",
         scene_class="" if recording else "none",
         data=_json(data),
@@ -127,8 +143,19 @@ def _json(value: Any) -> str:
     return text
 
 
+def _times(times: np.ndarray | None) -> list[float]:
+    return [] if times is None else times.round(6).tolist()
+
+
 def _css(color: tuple[int, int, int]) -> str:
     return "#{:02x}{:02x}{:02x}".format(*color)
+
+
+# What shows and hides the ghost.
+_GHOST = (
+    '<label><input type="checkbox" id="ghost" checked> '
+    f'<i style="background: {_css(scene.COLORS["ghost"])}"></i> ghost: before repair</label>'
+)
 
 
 # ---- What is plotted ----
@@ -202,49 +229,15 @@ def _columns(
 # ---- What is written ----
 
 
-def _number(value: float | None, unit: str = "", digits: int = 3) -> str:
-    """A number as people write it; a dash for none."""
-    if value is None or not np.isfinite(value):
-        return "–"
-    text = f"{value:.{digits}g}"
-    if "e" in text:
-        mantissa, exponent = text.split("e")
-        text = f"{mantissa}·10<sup>{int(exponent)}</sup>"
-    return text.replace("-", "−") + (f"&nbsp;{escape(unit)}" if unit else "")
-
-
-def _percent(share: float) -> str:
-    if 0.0 < share < 0.001:
-        return "&lt;&nbsp;0.1&nbsp;%"
-    return f"{100.0 * share:.1f}&nbsp;%"
-
-
-def _moment(time: float | None) -> str:
-    """A time that one can go to."""
-    if time is None:
-        return "–"
-    return f'<button type="button" class="time" data-time="{time!r}">{time:.2f}&nbsp;s</button>'
-
-
-def _table(titles: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
-    """A table of cells that are HTML already; the first of each row is its head."""
-    head = "".join(f'<th scope="col">{title}</th>' for title in titles)
-    body = "".join(
-        f'<tr><th scope="row">{first}</th>' + "".join(f"<td>{cell}</td>" for cell in rest) + "</tr>"
-        for first, *rest in rows
-    )
-    return f'<table class="{kind}"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
-
-
 def _head(summary: Mapping[str, Any]) -> str:
     statuses = ", ".join(f"{count} {escape(name)}" for name, count in summary["statuses"].items())
     facts = [
-        f"{summary['frames']} frames in {_number(summary['duration'], 's', 4)}"
-        f" ({_number(summary['frame_rate'], 'Hz')})",
+        f"{summary['frames']} frames in {number_text(summary['duration'], 's', 4)}"
+        f" ({number_text(summary['frame_rate'], 'Hz')})",
         statuses,
-        _number(summary["mass"], "kg", 4),
-        f"ω = {_number(summary['omega'], 'rad/s')}",
-        f"mean vertical force {_number(summary['mean_vertical_force'], 'm g', 4)}",
+        number_text(summary["mass"], "kg", 4),
+        f"ω = {number_text(summary['omega'], 'rad/s')}",
+        f"mean vertical force {number_text(summary['mean_vertical_force'], 'm g', 4)}",
     ]
     return (
         f"<h1>{escape(summary['clip'])} <span>on {escape(summary['robot'])}</span></h1>"
@@ -263,7 +256,7 @@ def _verdict(summary: Mapping[str, Any]) -> str:
         f"<h2>{escape(verdict[:1].upper() + verdict[1:])}</h2>",
     ]
     if summary["distance"]:
-        text = distance_text(summary["distance"], _moment)
+        text = distance_text(summary["distance"], time_button)
         parts.append(f'<p class="caption distance">Distance: {text}</p>')
     if kind == "unknown":
         parts.append(f"<p><code>too_short</code> {escape(TOO_SHORT)}</p>")
@@ -286,12 +279,12 @@ def _windows(summary: Mapping[str, Any], listed: int = 20) -> str:
     windows = summary["windows"]
     if not windows:
         return '<p class="caption">No window without fault.</p>'
-    texts = [f"{_moment(begin)} to {_moment(end)}" for begin, end in windows[:listed]]
+    texts = [f"{time_button(begin)} to {time_button(end)}" for begin, end in windows[:listed]]
     if len(windows) > listed:
         texts.append(f"and {len(windows) - listed} more")
+    share = percent_text(summary["feasible_share"])
     return (
-        f'<p class="caption">Windows without fault, {_percent(summary["feasible_share"])} of the '
-        f"frames: {', '.join(texts)}</p>"
+        f'<p class="caption">Windows without fault, {share} of the frames: {", ".join(texts)}</p>'
     )
 
 
@@ -299,16 +292,16 @@ def _reasons(reasons: Sequence[Mapping[str, Any]]) -> str:
     rows = [
         (
             f"<code>{escape(reason['code'])}</code> {escape(reason['text'])}",
-            f"{reason['frames']} ({_percent(reason['share'])})",
-            _percent(reason["allowed_share"]),
-            _number(reason["worst"], reason["unit"]),
-            _number(reason["threshold"], reason["unit"]),
-            _moment(reason["time"]),
+            f"{reason['frames']} ({percent_text(reason['share'])})",
+            percent_text(reason["allowed_share"]),
+            number_text(reason["worst"], reason["unit"]),
+            number_text(reason["threshold"], reason["unit"]),
+            time_button(reason["time"]),
         )
         for reason in reasons
     ]
     titles = ("Reason", "Frames", "allowed", "Worst", "threshold", "at")
-    return _table(titles, rows, "reasons")
+    return table(titles, rows, "reasons")
 
 
 def _notes(notes: Sequence[str]) -> str:
@@ -322,10 +315,10 @@ def _dot(color: tuple[int, int, int]) -> str:
     return f'<i style="background: {_css(color)}"></i>'
 
 
-def _key(robot: Robot, summary: Mapping[str, Any]) -> str:
+def _key(robot: Robot, summary: Mapping[str, Any], points: Mapping[str, str]) -> str:
     """What the scene's colours mean."""
-    points = _points(summary) | {"support": "support"}
     colors = {title: scene.COLORS[name] for name, title in points.items()}
+    colors["support"] = scene.COLORS["support"]
     for number, name in enumerate([*robot.contacts, *summary["bodies"]]):
         colors[f"force on {name}"] = scene.contact_color(number)
     return "".join(f"<span>{_dot(color)} {escape(text)}</span>" for text, color in colors.items())
@@ -338,22 +331,22 @@ def _contacts(robot: Robot, summary: Mapping[str, Any]) -> str:
         rows.append(
             (
                 f"{_dot(scene.contact_color(number))} {escape(name)}",
-                _percent(contact["active_share"]),
-                _percent(contact["weight_share"]),
-                _number(contact["largest_vertical_force"], "m g"),
-                _number(contact["largest_cone_usage"]),
-                _number(summary["ground"].get(name), "m"),
+                percent_text(contact["active_share"]),
+                percent_text(contact["weight_share"]),
+                number_text(contact["largest_vertical_force"], "m g"),
+                number_text(contact["largest_cone_usage"]),
+                number_text(summary["ground"].get(name), "m"),
             )
         )
     for number, (link, body) in enumerate(summary["bodies"].items(), len(robot.contacts)):
         rows.append(
             (
                 f"{_dot(scene.contact_color(number))} {escape(link)}",
-                _percent(body["active_share"]),
-                _percent(body["weight_share"]),
-                _number(body["largest_vertical_force"], "m g"),
-                _number(None),
-                _number(None),
+                percent_text(body["active_share"]),
+                percent_text(body["weight_share"]),
+                number_text(body["largest_vertical_force"], "m g"),
+                number_text(None),
+                number_text(None),
             )
         )
     titles = (
@@ -364,7 +357,7 @@ def _contacts(robot: Robot, summary: Mapping[str, Any]) -> str:
         "Largest use of the friction cone",
         "Ground at",
     )
-    return f"<section><h2>Contacts</h2>{_table(titles, rows)}</section>"
+    return f"<section><h2>Contacts</h2>{table(titles, rows)}</section>"
 
 
 def _sensitivity(summary: Mapping[str, Any]) -> str:
@@ -373,11 +366,12 @@ def _sensitivity(summary: Mapping[str, Any]) -> str:
         return ""
     rows = [
         (
-            _number(entry["cutoff"], "Hz") + (" *" if entry["cutoff"] == summary["cutoff"] else ""),
+            number_text(entry["cutoff"], "Hz")
+            + (" *" if entry["cutoff"] == summary["cutoff"] else ""),
             escape(entry["verdict"]),
-            _number(entry["residual_force_rms"], "m g"),
-            _number(entry["residual_torque_rms"], "m g·m"),
-            _percent(entry["relaxed_share"]),
+            number_text(entry["residual_force_rms"], "m g"),
+            number_text(entry["residual_torque_rms"], "m g·m"),
+            percent_text(entry["relaxed_share"]),
         )
         for entry in entries
     ]
@@ -390,7 +384,7 @@ def _sensitivity(summary: Mapping[str, Any]) -> str:
     )
     return (
         "<section><h2>How it depends on the filter</h2>"
-        f"{_table(titles, rows)}<p class='caption'>* used for this report</p></section>"
+        f"{table(titles, rows)}<p class='caption'>* used for this report</p></section>"
     )
 
 
@@ -399,14 +393,14 @@ def _measured(summary: Mapping[str, Any]) -> str:
         return ""
     kinds = {"bias": "bias", "rms": "RMS", "correlation": "correlation"}
     rows = [
-        (f"{escape(name)}, {title}", *map(_number, values[kind]))
+        (f"{escape(name)}, {title}", *map(number_text, values[kind]))
         for name, values in summary["measured"].items()
         for kind, title in kinds.items()
     ]
     axes = [f"{letter}<sub>{axis}</sub>" for letter in "fτ" for axis in "xyz"]
     return (
         "<section><h2>Computed against the file's forces</h2>"
-        f"{_table(('', *axes), rows)}"
+        f"{table(('', *axes), rows)}"
         "<p class='caption'>Computed minus the file's, in the contacts' frames, N and N·m.</p>"
         "</section>"
     )

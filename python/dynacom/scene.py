@@ -18,7 +18,10 @@ import pinocchio as pin
 
 from dynacom.dynacom_pywrap import Contact6DSettings
 from dynacom.errors import DynacomError
+from dynacom.repair_change import Before
 from dynacom.robots import ContactSettings, Robot
+from dynacom.scene_before import Ghost, MovingPath
+from dynacom.scene_robot import draw_robot
 
 #: Red, green, blue of what is drawn here and in the page's plots. Kept apart by those, too, who do
 #: not see all colours (the palette of Okabe and Ito).
@@ -28,6 +31,10 @@ COLORS = {
     "vrp": (0, 114, 178),
     "feasible_com": (122, 81, 149),
     "support": (240, 228, 66),
+    # Before repair: the robot, and points in paler colours than after it.
+    "ghost": (70, 110, 220),
+    "com_before": (145, 145, 145),
+    "cop_before": (236, 165, 112),
 }
 CONTACT_COLORS = (
     *((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233)),
@@ -77,6 +84,8 @@ class Recording:
     html: str
     #: When its frames are [s], from its beginning.
     times: np.ndarray
+    #: When they are shown once more, without the ghost [s]; None where there is none.
+    times_without_ghost: np.ndarray | None
     #: What could not be drawn, and why; None where all was.
     note: str | None
 
@@ -87,6 +96,8 @@ def record(
     arrays: Mapping[str, np.ndarray],
     summary: Mapping[str, Any],
     rate: float = 15.0,
+    *,
+    before: Before | None = None,
 ) -> Recording:
     """Records a motion's scene.
 
@@ -95,24 +106,33 @@ def record(
         arrays: of the report, a row per frame.
         summary: of the report.
         rate: frames per second of the recording, at most; long motions get fewer.
+        before: the motion before repair, to be drawn as a ghost.
 
     Raises:
         DynacomError: viser is not installed.
     """
     # Those, too, that a reason leads to.
-    worst = [reason["time"] for reason in summary["reasons"] if reason["time"] is not None]
+    worst = [reason["time"] for reason in summary["reasons"]] + repair_times(summary)
+    worst = [time for time in worst if time is not None]
     frames = np.union1d(_thin(arrays["time"], rate), closest_frames(arrays["time"], worst))
     times = arrays["time"][frames] - arrays["time"][0]
     with _server(_import_viser(), port=0) as server:
-        scene = Scene(server, robot, q, arrays, summary)
+        scene = Scene(server, robot, q, arrays, summary, before)
         recorder = server.get_scene_serializer()
         # The last frame stays for as long as the others.
         pauses = np.diff(times, append=times[-1] + 1.0 / rate)
         with server.atomic():  # nobody waits for single changes
             for frame, pause in zip(frames, pauses, strict=True):
                 scene.show(frame)
-                recorder.insert_sleep(float(pause))
-        return Recording(recorder.as_html(), times, scene.note)
+                if scene.ghost is None:
+                    recorder.insert_sleep(float(pause))
+                    continue
+                # A player knows times alone: in the second half of its pause, a frame has no ghost.
+                for visible in (True, False):
+                    scene.ghost.visible = visible
+                    recorder.insert_sleep(float(pause) / 2.0)
+        without = None if scene.ghost is None else times + pauses / 2.0
+        return Recording(recorder.as_html(), times, without, scene.note)
 
 
 def show(
@@ -124,13 +144,14 @@ def show(
     announce: Callable[[str], None],
     stop: threading.Event | None = None,
     port: int = 8080,
+    before: Before | None = None,
 ) -> None:
     """Shows a motion's scene to a browser on this machine, with buttons to play it.
 
     Returns when it is stopped, or interrupted.
 
     Args:
-        q, arrays, summary: as for :func:`record`.
+        q, arrays, summary, before: as for :func:`record`.
         announce: is called once with the address to open.
         stop: ends the show when it is set, as the button in the browser does.
         port: the first to be tried.
@@ -141,8 +162,10 @@ def show(
     stop = threading.Event() if stop is None else stop
     clock = arrays["time"] - arrays["time"][0]
     with _server(_import_viser(), port) as server:
-        scene = Scene(server, robot, q, arrays, summary)
+        scene = Scene(server, robot, q, arrays, summary, before)
         controls = _Controls(server, float(clock[-1]), stop)
+        if scene.ghost is not None:
+            controls.add_ghost(scene.ghost)
         announce(f"http://{server.get_host()}:{server.get_port()}")
         shown = 0
         with contextlib.suppress(KeyboardInterrupt):
@@ -159,7 +182,7 @@ class _Controls:
     """What one plays a motion with."""
 
     def __init__(self, server: Any, duration: float, stop: threading.Event) -> None:
-        gui = server.gui
+        self._gui = gui = server.gui
         gui.configure_theme(show_logo=False, show_share_button=False)
         self._duration = max(duration, 1e-3)  # a slider needs a length
         self._playing = gui.add_checkbox("Play", True)
@@ -169,6 +192,14 @@ class _Controls:
         gui.add_button("Stop").on_click(lambda _: stop.set())
         self._time.on_update(self._pause)
         self._before = time.monotonic()
+
+    def add_ghost(self, ghost: Ghost) -> None:
+        """Adds what hides the ghost."""
+        box = self._gui.add_checkbox("Before repair", True)
+
+        @box.on_update
+        def _(_: Any) -> None:
+            ghost.visible = box.value
 
     def _pause(self, event: Any) -> None:
         if event.client is not None:  # else it was advance()
@@ -194,12 +225,13 @@ class Scene:
         q: np.ndarray,
         arrays: Mapping[str, np.ndarray],
         summary: Mapping[str, Any],
+        before: Before | None = None,
     ) -> None:
         """Draws the first frame.
 
         Args:
             server: a viser.ViserServer with nothing in it.
-            robot, q, arrays, summary: as for :func:`record`.
+            robot, q, arrays, summary, before: as for :func:`record`.
         """
         self._scene = server.scene
         self._q, self._arrays = q, arrays
@@ -232,9 +264,14 @@ class Scene:
             position=(0.0, 0.0, self._ground),
         )
         self._aim_camera(server, robot.model, q[0])
-        self._robot, self.note = _draw_robot(server, robot)
+        self._robot, self.note = draw_robot(server, robot, f"{_WORLD}/robot")
         self._forces = [*self._draw_forces(robot), *self._draw_body_forces(robot, summary)]
         self._draw_points(has_distance=summary["distance"] is not None)
+        #: The motion before repair, if there is one.
+        self.ghost: Ghost | None = None
+        self._paths: list[MovingPath] = []
+        if before is not None:
+            self._draw_before(server, robot, before)
         self.show(0)
 
     def show(self, frame: int) -> None:
@@ -255,6 +292,10 @@ class Scene:
             if ball.visible:
                 ball.position = (*point, self._ground)
         self._show_support(frame)
+        if self.ghost is not None:
+            self.ghost.show(frame)
+        for path in self._paths:
+            path.show(frame)
 
     def _aim_camera(self, server: Any, model: pin.Model, q: np.ndarray) -> None:
         """From the front, a little to the side, and from above."""
@@ -357,6 +398,30 @@ class Scene:
             thickness=0.3 * radius,
         )
 
+    def _draw_before(self, server: Any, robot: Robot, before: Before) -> None:
+        """The ghost, and the paths that it is compared by."""
+        radius = 0.035 * self._height
+        points = {f"{name}_before": places for name, places in self._places(before.arrays).items()}
+        self.ghost = Ghost(server, f"{_WORLD}/before", robot, before, points, COLORS, 0.8 * radius)
+        self._paths = [
+            MovingPath(
+                self._scene,
+                f"{_WORLD}/{name}_path",
+                self._arrays["time"],
+                places,
+                COLORS[name],
+                thickness=0.3 * radius,
+            )
+            for name, places in self._places(self._arrays).items()
+        ]
+
+    def _places(self, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """CoM and CoP, (T, 3) each; no CoP that is farther from below the CoM than this is high."""
+        com, cop = arrays["com"], arrays["cop"].copy()
+        cop[np.linalg.norm(cop - com[:, :2], axis=1) > self._height] = np.nan
+        # A little above the support's area.
+        return {"com": com, "cop": np.column_stack([cop, np.full(len(cop), self._ground + 0.004)])}
+
     def _show_support(self, frame: int) -> None:
         """The convex hull of the active contacts, at the height of the lowest."""
         active = np.flatnonzero(self._active[:, frame])
@@ -373,6 +438,13 @@ class Scene:
         hull = np.column_stack([hull, np.full(len(hull), height)]).round(3)
         self._support.vertices = hull
         self._border.points = np.stack([hull, np.roll(hull, -1, axis=0)], axis=1)
+
+
+def repair_times(summary: Mapping[str, Any]) -> list[float | None]:
+    """The times that the page's section on repair leads to [s]."""
+    repair = summary.get("repair") or {}
+    changes = [repair.get(name) or {} for name in ("root", "joints", "com")]
+    return [item.get("time") for item in (*changes, *(repair.get("reasons") or []))]
 
 
 def _force_path(number: int, name: str) -> str:
@@ -432,96 +504,6 @@ def _centre(time: np.ndarray, com: np.ndarray, height: float) -> np.ndarray:
     first = np.searchsorted(time, time - 1.0)
     last = np.searchsorted(time, time + 1.0, side="right")
     return (sums[last] - sums[first]) / (last - first)[:, None]
-
-
-# ---- The robot ----
-
-
-def _draw_robot(server: Any, robot: Robot) -> tuple[Callable[[np.ndarray], None], str | None]:
-    """Draws the robot's meshes, else its joints: a function that moves them, and what lacks."""
-    try:
-        # Objects belong to the joints that move the links of their names.
-        folders = [str(folder) for folder in robot.urdf.resolve().parents]
-        visuals = pin.buildGeomFromUrdf(
-            robot.model, str(robot.urdf), pin.GeometryType.VISUAL, package_dirs=folders
-        )
-        for visual in visuals.geometryObjects:
-            visual.meshColor = np.array([*visual.meshColor[:3], 0.4])
-        turn_upright(robot.model, visuals)
-        if len(visuals.geometryObjects) > 0:
-            return _draw_meshes(server, robot, visuals), None
-        note = f"{robot.urdf.name} has no visuals: the robot is drawn as lines."
-    except Exception as error:  # readers of meshes promise no types
-        reason = DynacomError(str(error) or type(error).__name__)
-        note = f"The robot is drawn as lines: its meshes cannot be read ({reason})"
-    return _draw_skeleton(server, robot), note
-
-
-def turn_upright(model: pin.Model, visuals: pin.GeometryModel) -> None:
-    """Turns meshes whose files say that y is up, if that is what the URDF expects.
-
-    COLLADA means by it that z becomes what was y; many programs, Pinocchio among them, do not turn
-    anything, and URDFs are made for either. Right is what brings meshes closer to the next joints.
-    """
-    upright = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2.0, 0.0, 0.0), np.zeros(3))
-    tilted = [visual for visual in visuals.geometryObjects if _has_y_up(visual.meshPath)]
-    gaps = np.zeros(2)
-    for visual in tilted:
-        visual.geometry.computeLocalAABB()
-        box = visual.geometry.aabb_local
-        joints = [j for j in range(1, model.njoints) if model.parents[j] == visual.parentJoint]
-        for option, placement in enumerate((visual.placement, visual.placement * upright)):
-            for joint in joints:
-                place = placement.actInv(model.jointPlacements[joint].translation)
-                outside = np.maximum(box.min_ - place, place - box.max_).clip(min=0.0)
-                gaps[option] += np.linalg.norm(outside)
-    if gaps[1] < gaps[0]:
-        for visual in tilted:
-            visual.placement = visual.placement * upright
-
-
-def _has_y_up(path: str) -> bool:
-    if not path.lower().endswith(".dae"):
-        return False
-    with open(path, "rb") as file:
-        return b"<up_axis>Y_UP" in file.read(10000)  # it is in the file's first element
-
-
-def _draw_meshes(server: Any, robot: Robot, visuals: pin.GeometryModel) -> Any:
-    from pinocchio.visualize import ViserVisualizer
-
-    visualizer = ViserVisualizer(robot.model, pin.GeometryModel(), visuals)
-    visualizer.initViewer(viewer=server)
-    try:
-        visualizer.loadViewerModel(f"{_WORLD}/robot")
-    except Exception:
-        server.scene.remove_by_name(f"{_WORLD}/robot")
-        raise
-    # One for every frame of the model, never seen.
-    visualizer.framesRootFrame.remove()
-    return visualizer.display
-
-
-def _draw_skeleton(server: Any, robot: Robot) -> Callable[[np.ndarray], None]:
-    model, data = robot.model, robot.model.createData()
-    # Lines from every joint to its parent, and from the contacts to theirs.
-    joints = range(2, model.njoints)
-    frames = [model.getFrameId(settings.frame_name) for settings in robot.contacts.values()]
-
-    def lines(q: np.ndarray) -> np.ndarray:
-        pin.framesForwardKinematics(model, data, q)
-        pairs = [(data.oMi[model.parents[joint]], data.oMi[joint]) for joint in joints]
-        pairs += [(data.oMi[model.frames[frame].parentJoint], data.oMf[frame]) for frame in frames]
-        return np.array([[a.translation, b.translation] for a, b in pairs])
-
-    handle = server.scene.add_line_segments(
-        f"{_WORLD}/robot", lines(pin.neutral(model)), (90, 90, 90), thickness=0.02
-    )
-
-    def move(q: np.ndarray) -> None:
-        handle.points = lines(q)
-
-    return move
 
 
 # ---- viser ----

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 import dynacom
-from dynacom import Clip, ContactSchedule, Motion
+from dynacom import AnalysisOptions, Clip, ContactSchedule, Motion
+from dynacom.repair_change import Before
 from dynacom.robots import Robot
 from helpers import WALKS
 
@@ -51,3 +52,27 @@ def report(
     )
     found = dynacom.analyze(clip, robot)
     return found.arrays, found.summary
+
+
+def repaired_walk(robot: Robot) -> tuple[Before, np.ndarray, Arrays, Summary]:
+    """Talos' bundled walk, made so fast that Talos would fall, and repaired.
+
+    Returns:
+        What it was before; the configurations, the arrays and the summary of the report after.
+    """
+    with np.load(WALKS / "talos_walk.npz") as file:
+        time, q, contacts = file["t"] / 1.85, file["q"], file["contacts"]
+        schedule = ContactSchedule(file["contact_names"].tolist(), contacts)
+    unfiltered = AnalysisOptions(cutoff=0.0)
+
+    def analyze(q: np.ndarray) -> dynacom.MotionReport:
+        given = (robot.joints.names, schedule, {}, np.zeros(len(time)), ())
+        clip = Clip(Path("clip.npz"), time, q, None, None, *given)
+        return dynacom.analyze(clip, robot, options=unfiltered, sensitivity=False)
+
+    before = analyze(q)
+    parts = dynacom.splitContacts(robot.dynacom())
+    found = before.examination
+    motion = dynacom.repairMotion(parts, found.derived.motion, found.inference.schedule).motion
+    after = analyze(np.asarray(motion.q))
+    return Before(q, before.arrays, before.summary), motion.q, after.arrays, after.summary

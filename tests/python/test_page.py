@@ -12,11 +12,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from playwright.sync_api import Page
 
 from browser import difference, open_page, open_scene, settled_picture, wait_for
-from dynacom import DynacomError, page
+from dynacom import DynacomError, page_html
+from dynacom import scene as page_scene
 from dynacom.page import write_page
+from dynacom.repair_change import Before
 from dynacom.robots import Robot
 from helpers import WALKS
-from report_case import Arrays, Summary, walk_report
+from report_case import Arrays, Summary, repaired_walk, walk_report
 
 Report = tuple[np.ndarray, Arrays, Summary]
 
@@ -265,12 +267,284 @@ def test_hostile_names(talos, hurried, tmp_path, monkeypatch):
         wait_for(lambda: label.count() and HOSTILE in label.text_content(), "the label")
 
 
+# ---- Repaired motions ----
+
+# Of another motion than the one beside it: these are texts.
+REPAIR = {
+    "outcome": "repaired",
+    "file": "mended.csv",
+    "sha256": "0123456789abcdef",
+    "exact": True,
+    "verdict_before": "not feasible",
+    "codes_before": ["cop_outside", "residual_torque"],
+    "verdict": "feasible",
+    "codes": ["feasible"],
+    "verdict_filtered": "repairable",
+    "codes_filtered": ["foot_sliding"],
+    "missing_before": {"force_rms": 0.0321, "torque_rms": 0.0654, "frames": 263},
+    "missing": {"force_rms": 0.00123, "torque_rms": 0.00456, "frames": 7},
+    "root": {"rms": 0.0015, "largest": 0.00612, "time": 1.25},
+    "joints": {"rms": 0.001, "largest": np.pi / 90.0, "time": 1.5, "joint": "left_knee"},
+    "com": {"rms": 0.0011, "largest": 0.00527, "time": 1.75},
+    "rungs": [
+        {
+            "name": "balance",
+            "missing_frames_before": 263,
+            "missing_frames_after": 7,
+            "text": "What moves stays.",
+        }
+    ],
+    "stances": {
+        **{"count": 12, "held": 10, "largest_speed_before": 0.081, "largest_speed": 0.0123},
+        **{"largest_drift_before": 0.0172, "largest_drift": 0.00034},
+    },
+    "reasons": [],
+}
+CHANGE_PLOTS = ("change_root", "change_com", "change_joints")
+
+
+@pytest.fixture(scope="module")
+def repaired(talos: Robot) -> tuple[Before, np.ndarray, Arrays, Summary]:
+    before, q, arrays, summary = repaired_walk(talos)
+    return before, q, arrays, summary | {"repair": REPAIR}
+
+
+def written(path: Path, talos: Robot, report: Report, before: Before | None) -> str:
+    write_page(path, talos, *report, before=before)
+    return path.read_text("utf-8")
+
+
+def section(text: str) -> str:
+    """That on repair, without what it looks like."""
+    begin = text.index('<section class="repair')
+    found = text[begin : text.index("</section>", begin)]
+    for tag in ("<b>", "</b>", "<small>", "</small>"):
+        found = found.replace(tag, "|" if "small" in tag else "")
+    return found.replace("&nbsp;", " ")
+
+
+def row(text: str, title: str) -> list[str]:
+    """The cells of a section's row."""
+    cells = text[text.index(f'<th scope="row">{title}</th>') :].split("</tr>")[0]
+    return [cell.split("</td>")[0] for cell in cells.split("<td>")[1:]]
+
+
+def test_the_section_on_repair(talos, repaired, tmp_path, monkeypatch):
+    """What there was and is, by how much it was changed, and when the most."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    before, *after = repaired
+    page = written(tmp_path / "report.html", talos, after, before)
+    text = section(page)
+    assert page.index('class="repair') < page.index('class="verdict')
+    assert 'class="repair good"><h2>Repair: done</h2>' in text
+    assert "is the ghost in the scene" in text
+    assert "Written to mended.csv, exactly" in text
+    assert REPAIR["sha256"] in text
+    for title, *cells in (
+        ("Verdict", "not feasible|cop_outside, residual_torque|", "feasible"),
+        ("Verdict, filtered", "–", "repairable|foot_sliding|"),
+        ("Missing force, RMS", "0.0321 m g", "0.00123 m g"),
+        ("Missing moment, RMS", "0.0654 m g·m", "0.00456 m g·m"),
+        ("Frames out of reach", "263", "7"),
+        ("Stance, largest speed", "81 mm/s", "12.3 mm/s"),
+        ("Stance, largest drift", "17.2 mm", "0.34 mm"),
+        ("balance What moves stays.", "263", "7"),
+    ):
+        assert row(text, title) == cells
+    for title, rms, largest, time in (
+        ("Root, displaced", "1.5 mm", "6.12 mm", 1.25),
+        ("Joints, turned", "0.0573 °", "2 °|left_knee|", 1.5),
+        ("Centre of mass, displaced", "1.1 mm", "5.27 mm", 1.75),
+    ):
+        *sizes, button = row(text, title)
+        assert sizes == [rms, largest]
+        assert f'data-time="{time}"' in button
+    assert "10 of 12 stances are held still." in text
+
+
+def test_what_could_not_be_mended(talos, repaired, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    before, q, arrays, summary = repaired
+    reasons = [{"code": "contact_needed", "time": 1.2, "text": "Nothing touches."}]
+    failed = REPAIR | {"outcome": "not repaired", "exact": False, "reasons": reasons}
+    report = (q, arrays, summary | {"repair": failed})
+    text = section(written(tmp_path / "report.html", talos, report, before))
+    assert 'class="repair bad"><h2>Repair: not done</h2>' in text
+    assert "Written to mended.csv, rounded" in text
+    (button,) = row(text, "<code>contact_needed</code> Nothing touches.")
+    assert 'data-time="1.2"' in button
+
+
+def test_nothing_to_repair(talos, repaired, tmp_path, monkeypatch):
+    """There is no ghost, although the caller has a motion before; the section says so."""
+    monkeypatch.setattr(page_scene, "record", without_before(page_scene.record))
+    before, q, arrays, summary = repaired
+    report = (q, arrays, summary | {"repair": REPAIR | {"outcome": "feasible"}})
+    page = written(tmp_path / "report.html", talos, report, before)
+    text = section(page)
+    assert 'class="repair good"><h2>Repair: nothing to do</h2>' in text
+    assert "Nothing was changed: the motion was feasible as it was. So there is no ghost." in text
+    assert "is the ghost" not in text
+    assert 'id="ghost"' not in page
+    assert 'change_root"' not in page[page.index('id="data"') : page.index('id="numbers"')]
+    assert page.count('<figure class="none">') == len(CHANGE_PLOTS)
+
+
+def without_before(record):
+    """A recording that is never asked for a ghost, and is quick."""
+
+    def recorded(robot, q, arrays, summary, rate, *, before):
+        assert before is None
+        return record(robot, q, arrays, summary, 1.0)
+
+    return recorded
+
+
+@pytest.mark.parametrize("depth", ["all", "fields"])
+def test_of_a_repair_may_be_unknown(talos, repaired, tmp_path, monkeypatch, depth):
+    """Anything: dashes, or nothing, stand for it."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    before, q, arrays, summary = repaired
+
+    def without(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: without(item) for key, item in value.items()}
+        return [without(item) for item in value] if value and isinstance(value, list) else None
+
+    reasons = [{"code": "a", "time": 1.2, "text": "b"}]
+    unknown = without(REPAIR | {"reasons": reasons})
+    if depth == "all":
+        unknown = dict.fromkeys(REPAIR)
+    text = section(
+        written(tmp_path / "a.html", talos, (q, arrays, summary | {"repair": unknown}), before)
+    )
+    assert 'class="repair unknown"><h2>Repair</h2>' in text
+    assert "None" not in text
+    for nothing in (None, {}):
+        report = (q, arrays, summary | {"repair": nothing})
+        page = written(tmp_path / "b.html", talos, report, before)
+        assert '<section class="repair' not in page
+        assert 'id="ghost"' in page
+
+
+def test_hostile_repairs(talos, repaired, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    before, q, arrays, summary = repaired
+
+    def hostile(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: hostile(item) for key, item in value.items()}
+        if isinstance(value, list):
+            return [hostile(item) for item in value]
+        return HOSTILE if isinstance(value, str) else value
+
+    repair = hostile(REPAIR | {"reasons": [{"code": "a", "time": 1.2, "text": "b"}]})
+    repair |= {key: [f"{HOSTILE}, a code"] for key in repair if key.startswith("codes")}
+    path = tmp_path / "report.html"
+    write_page(path, talos, q, arrays, summary | {"repair": repair}, before=before)
+    with open_page(path) as tab:
+        tab.locator("#clock", has_text="frame 0").wait_for()
+        assert tab.locator("img, main script").count() == 0
+        # The outcome, the file and its sum, three verdicts with their codes, a joint, and two texts
+        # each of a step and of a reason.
+        assert tab.locator(".repair").text_content().count(HOSTILE) == 14
+
+
+def test_what_repair_has_changed_is_drawn(talos, repaired, tmp_path, monkeypatch):
+    """Over time, and as paths from above; what was missing stands beside what is."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    before, q, arrays, summary = repaired
+    write_page(tmp_path / "report.html", talos, q, arrays, summary, before=before)
+    with open_page(tmp_path / "report.html") as tab:
+        tab.locator("#clock", has_text="frame 0").wait_for()
+
+        def traces(plot: str) -> dict[str, np.ndarray]:
+            script = (
+                "(plot) => document.getElementById(plot).data"
+                ".filter(({name, y}) => name && y.length > 1)"
+                ".map(({name, y}) => [name, Array.from(y)])"
+            )
+            return {name: np.array(y, dtype=float) for name, y in tab.evaluate(script, plot)}
+
+        root = 1e3 * np.linalg.norm(q[:, :3] - before.q[:, :3], axis=1)
+        assert_allclose(traces("change_root")["root"], root, rtol=1e-3, atol=1e-5)
+        com = 1e3 * np.linalg.norm(arrays["com"] - before.arrays["com"], axis=1)
+        assert_allclose(traces("change_com")["CoM"], com, rtol=1e-5, atol=1e-5)
+        turned = np.degrees(np.abs(q[:, 7:] - before.q[:, 7:]).max(axis=1))
+        assert_allclose(traces("change_joints")["joint"], turned, rtol=1e-5, atol=1e-6)
+        for name, part in (("force", slice(3)), ("torque", slice(3, 6))):
+            drawn = traces(f"residual_{name}")
+            assert list(drawn) == ["before", "after"]
+            for key, values, weight in (
+                ("before", before.arrays, before.summary["weight"]),
+                ("after", arrays, summary["weight"]),
+            ):
+                missing = np.linalg.norm(values["residual"][:, part], axis=1) / weight
+                assert_allclose(drawn[key], missing, rtol=1e-5, atol=1e-12)
+            assert drawn["before"].max() > 10.0 * drawn["after"].max()
+        paths = traces("above")
+        for title, values in (("", arrays), (" before", before.arrays)):
+            assert_allclose(paths[f"CoM{title}"], values["com"][:, 1], atol=1e-6)
+            assert_allclose(paths[f"CoP{title}"], values["cop"][:, 1], rtol=1e-6, atol=1e-6)
+        # They can be told apart, in the legend, too.
+        lines = tab.evaluate(
+            "document.getElementById('above').data.filter(({name}) => /^Co[MP]/.test(name))"
+            ".filter(({line}) => line).map(({name, line}) => [name, line.color, line.dash])"
+        )
+        assert len({color for _, color, _ in lines}) == len(lines) == 4
+        assert {name for name, _, dash in lines if dash == "dot"} == {"CoM before", "CoP before"}
+        # Times in the section lead there.
+        tab.locator(".repair").get_by_role("button").first.click()
+        wait_for(lambda: abs(clock(tab) - 1.25) < 0.01, "the clock")
+
+
+def test_the_ghost_can_be_hidden(talos, repaired, tmp_path):
+    """By a box beside the scene; the player goes on from there, with it and without."""
+    before, q, arrays, summary = repaired
+    moved = before.q.copy()
+    moved[:, 1] += 0.3  # so that one sees it
+    path = tmp_path / "report.html"
+    apart = Before(moved, before.arrays, before.summary)
+    write_page(path, talos, q, arrays, summary, before=apart, scene_rate=5.0)
+    with open_page(path) as tab:
+        tab.set_viewport_size({"width": 1280, "height": 1600})
+        open_scene(tab)
+        shown = settled_picture(tab, "#scene")
+        assert blue_share(shown) > 0.02
+        tab.locator("#ghost").uncheck()
+        hidden = settled_picture(tab, "#scene")
+        assert difference(shown, hidden) > 0.02
+        assert blue_share(hidden) < 0.2 * blue_share(shown)
+        tab.locator("#slider").fill("150")
+        wait_for(lambda: clock(tab) == pytest.approx(arrays["time"][150], abs=1e-3), "the clock")
+        assert blue_share(settled_picture(tab, "#scene")) < 0.2 * blue_share(shown)
+        tab.locator("#slider").fill("0")
+        tab.locator("#ghost").check()
+        assert difference(shown, settled_picture(tab, "#scene")) < 1e-3
+
+
+def blue_share(seen: np.ndarray) -> float:
+    """The share of the pixels that have the ghost's hue."""
+    red, green, blue = np.moveaxis(seen, 2, 0)
+    return float(np.mean((blue - red > 0.08) & (blue - green > 0.04)))
+
+
 # ---- What is in it ----
 
 
 def test_size(hurried_page):
     """Plotly and viser, which every page has, leave room for half a minute in 12 MB."""
     assert hurried_page.stat().st_size < 6e6
+
+
+def test_size_with_a_ghost(talos, repaired, tmp_path):
+    """Whose meshes are those of the robot, which are not there twice."""
+    before, *after = repaired
+    paths = [tmp_path / f"{name}.html" for name in ("alone", "compared")]
+    for path, motion in zip(paths, (None, before), strict=True):
+        write_page(path, talos, *after, before=motion, scene_rate=5.0)
+    alone, compared = (path.stat().st_size for path in paths)
+    assert compared < 1.15 * alone
 
 
 def test_feasible_walk(talos, tmp_path, monkeypatch):
@@ -388,11 +662,11 @@ def test_without_plotly(talos, hurried, tmp_path, monkeypatch):
     ],
 )
 def test_numbers(value, text):
-    assert page._number(value, "kg").replace("&nbsp;", " ") == text
+    assert page_html.number_text(value, "kg").replace("&nbsp;", " ") == text
 
 
 @pytest.mark.parametrize(
     ("share", "text"), [(0.0, "0.0 %"), (0.0004, "&lt; 0.1 %"), (0.05, "5.0 %"), (1.0, "100.0 %")]
 )
 def test_shares(share, text):
-    assert page._percent(share).replace("&nbsp;", " ") == text
+    assert page_html.percent_text(share).replace("&nbsp;", " ") == text

@@ -3,10 +3,12 @@
 
 import base64
 import dataclasses
+import io
 import re
 import sys
 import threading
 from collections import defaultdict
+from collections.abc import Iterable
 from typing import Any
 
 import msgspec
@@ -14,15 +16,18 @@ import numpy as np
 import pinocchio as pin
 import pinocchio.visualize
 import pytest
+import trimesh
 import zstandard
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import ConvexHull
 
 from browser import open_page, wait_for
-from dynacom import ContactSchedule, DynacomError, Motion, scene
+from dynacom import ContactSchedule, DynacomError, Motion, scene, scene_robot
+from dynacom.repair_change import Before
 from dynacom.robots import Robot
+from dynacom.scene_before import MovingPath
 from helpers import robots_folder
-from report_case import Arrays, Summary, report, walk_report
+from report_case import Arrays, Summary, repaired_walk, report, walk_report
 
 Report = tuple[np.ndarray, Arrays, Summary]
 
@@ -132,18 +137,26 @@ def test_nothing_is_added_again(player):
 def test_robot_moves_by_its_names(talos, walk, recording, player):
     """As a model read without DynaCoM does, whose joints have other numbers."""
     q, arrays, _ = walk
+    frames = frames_of(recording, arrays)
+    assert_moves(talos, q, "/world/robot", player, zip(recording.times, frames, strict=True))
+
+
+def assert_moves(
+    talos: Robot, q: np.ndarray, name: str, player: Player, moments: Iterable[tuple[float, int]]
+) -> None:
+    """All meshes below a name are where the configurations put them, at times of frames."""
     urdf = str(talos.urdf)
     folders = [str(robots_folder().parents[1])]
     own = pin.buildModelFromUrdf(urdf)  # without free-flyer
     visuals = pin.buildGeomFromUrdf(own, urdf, pin.GeometryType.VISUAL, package_dirs=folders)
     assert visuals.ngeoms > 40
     data, placements = own.createData(), visuals.createData()
-    for time, frame in list(zip(recording.times, frames_of(recording, arrays), strict=True))[::20]:
+    for time, frame in list(moments)[::20]:
         root = pin.XYZQUATToSE3(pin.normalize(talos.model, q[frame])[:7])
         pin.updateGeometryPlacements(own, data, visuals, placements, q[frame, 7:])
         objects = player.at(time)
         for visual, placement in zip(visuals.geometryObjects, placements.oMg, strict=True):
-            drawn = objects[f"/world/robot/visual/{visual.name}"]
+            drawn = objects[f"{name}/visual/{visual.name}"]
             w, *xyz = drawn["wxyz"]
             expected = root * placement
             # viser leaves out what moves by less than a micrometre.
@@ -263,7 +276,7 @@ def visuals_of(urdf: str) -> tuple[pin.Model, pin.GeometryModel]:
 def test_meshes_with_y_up():
     """iCub's legs, whose meshes' files say so and mean it, are as long as from joint to joint."""
     model, visuals = visuals_of("icub_description/robots/icub.urdf")
-    scene.turn_upright(model, visuals)
+    scene_robot.turn_upright(model, visuals)
     data, placements = model.createData(), visuals.createData()
     pin.updateGeometryPlacements(model, data, visuals, placements, pin.neutral(model))
     for link, upper, lower in (
@@ -293,8 +306,161 @@ def test_meshes_that_stay(urdf):
     """Those of the one say so, too, but are not meant to be turned; the other's do not."""
     model, visuals = visuals_of(urdf)
     before = [visual.placement.copy() for visual in visuals.geometryObjects]
-    scene.turn_upright(model, visuals)
+    scene_robot.turn_upright(model, visuals)
     assert [visual.placement for visual in visuals.geometryObjects] == before
+
+
+# ---- Before repair ----
+
+
+@pytest.fixture(scope="module")
+def repaired(talos: Robot) -> tuple[Before, np.ndarray, Arrays, Summary]:
+    return repaired_walk(talos)
+
+
+@pytest.fixture(scope="module")
+def compared(talos: Robot, repaired) -> scene.Recording:
+    before, *after = repaired
+    return scene.record(talos, *after, before=before)
+
+
+@pytest.fixture(scope="module")
+def compared_player(compared: scene.Recording) -> Player:
+    return Player(compared)
+
+
+def test_ghost_moves_as_before(talos, repaired, compared, compared_player):
+    before, q, arrays, _ = repaired
+    assert compared.note is None
+    moments = list(zip(compared.times, frames_of(compared, arrays), strict=True))
+    assert_moves(talos, before.q, "/world/before/robot", compared_player, moments)
+    assert_moves(talos, q, "/world/robot", compared_player, moments)
+
+
+def test_ghost_has_one_color_and_the_same_meshes(compared_player):
+    """Their vertices are in the recording once."""
+    objects = compared_player.at(0.0)
+    ghosts = {name: item for name, item in objects.items() if "/before/robot/visual/" in name}
+    assert len(ghosts) > 40
+    assert {tuple(item["color"]) for item in ghosts.values()} == {scene.COLORS["ghost"]}
+    assert {item["opacity"] for item in ghosts.values()} == {0.2}
+    assert not any(item["cast_shadow"] for item in ghosts.values())
+    places = {
+        message["name"]: message["props"]["vertices"]["__binary_index"]
+        for _, message in compared_player.messages
+        if message["type"] == "MeshMessage" and "/visual/" in message["name"]
+    }
+    shared = [name for name in ghosts if name in places]
+    assert len(shared) > 20
+    for name in shared:
+        assert places[name] == places[name.replace("/before", "")]
+
+
+def test_ghost_of_collada(anymal, anymal_standing):
+    """Whose meshes have colours of their own, and are as large in both."""
+    nv = anymal.model.nv
+    motion = Motion(np.arange(3) / 10.0, np.tile(anymal_standing, (3, 1)), *np.zeros((2, 3, nv)))
+    schedule = ContactSchedule(list(anymal.contacts), np.ones((3, 4), dtype=bool))
+    arrays, summary = report(anymal, motion, schedule)
+    before = Before(motion.q, arrays, summary)
+    player = Player(scene.record(anymal, motion.q, arrays, summary, before=before))
+    messages = {message["name"]: message for _, message in player.messages if "props" in message}
+    ghosts = {name: item for name, item in messages.items() if "/before/robot/visual/" in name}
+    plain = [name for name, item in ghosts.items() if item["type"] == "MeshMessage"]
+    assert len(plain) > 10
+    assert all(tuple(item["props"]["color"]) == scene.COLORS["ghost"] for item in ghosts.values())
+    objects = player.at(0.0)
+    for name in plain:
+        original = messages[name.replace("/before", "")]
+        assert original["type"] == "GlbMessage"
+        file = player._unpack(original["props"]["glb_data"])
+        expected = trimesh.load_scene(io.BytesIO(bytes(file)), file_type="glb").bounds
+        drawn = objects[name]["vertices"].reshape(-1, 3)
+        assert_allclose([drawn.min(axis=0), drawn.max(axis=0)], expected, atol=1e-5)
+
+
+def test_ghost_is_gone_in_between(compared, compared_player):
+    """Every frame is there with it, then without; all else is the same."""
+    assert len(compared.times_without_ghost) == len(compared.times)
+    assert (compared.times_without_ghost > compared.times).all()
+    assert (compared.times_without_ghost[:-1] < compared.times[1:]).all()
+    for shown, hidden in list(zip(compared.times, compared.times_without_ghost, strict=True))[::9]:
+        shown, hidden = compared_player.at(shown), compared_player.at(hidden)
+        assert shown["/world/before"].pop("visible")
+        assert not hidden["/world/before"].pop("visible")
+        assert shown.keys() == hidden.keys()
+        for name, item in shown.items():
+            assert all(np.array_equal(value, hidden[name][key]) for key, value in item.items())
+
+
+def test_no_ghost(recording, player):
+    assert recording.times_without_ghost is None
+    assert not [name for name in player.at(0.0) if "before" in name or "path" in name]
+
+
+def test_points_before_and_after(repaired, compared, compared_player):
+    """Where CoM and CoP are and were, and their paths within half a second."""
+    before, _, after, summary = repaired
+    ground = np.median([*summary["ground"].values()])
+    time = after["time"] - after["time"][0]
+    for now, frame in list(zip(compared.times, frames_of(compared, after), strict=True))[::7]:
+        objects = compared_player.at(now)
+        assert_allclose(
+            objects["/world/before/com_before"]["position"], before.arrays["com"][frame]
+        )
+        ball = objects["/world/before/cop_before"]
+        if ball["visible"]:
+            cop = before.arrays["cop"][frame]
+            assert_allclose(ball["position"], [*cop, ground + 0.004], atol=1e-7)
+        else:
+            away = before.arrays["cop"][frame] - before.arrays["com"][frame, :2]
+            assert not np.linalg.norm(away) < 0.8
+        near = np.abs(time - now) <= 0.5
+        for name, arrays in (("before/com_before", before.arrays), ("com", after)):
+            pieces = objects[f"/world/{name}_path"]["points"].reshape(-1, 2, 3)
+            place = arrays["com"][near]
+            distances = np.linalg.norm(pieces.reshape(-1, 1, 3) - place, axis=2)
+            assert distances.min(axis=1).max() < 1e-6  # it has no other points
+            assert distances.min(axis=0).max() < 0.02  # and comes by all of them
+            # It goes on from where it was.
+            assert_allclose(pieces[1:, 0], pieces[:-1, 1], atol=1e-9)
+
+
+def test_paths_have_holes(repaired):
+    """Where points are not known, or pressure is far from the feet."""
+
+    class Lines:
+        def add_line_segments(self, name, points, color, **options):
+            return self
+
+    lines = Lines()
+    time = np.arange(90) / 30.0
+    points = np.column_stack([time, time, time])
+    points[40:50] = np.nan
+    path = MovingPath(lines, "/path", time, points, (1, 2, 3), thickness=0.1)
+    path.show(44)
+    drawn = np.unique(lines.points.reshape(-1, 3)[:, 0])
+    assert lines.visible
+    assert_allclose(drawn, np.delete(time, np.s_[40:50])[29:50], atol=1e-6)
+    points[:] = np.nan
+    MovingPath(lines, "/path", time, points, (1, 2, 3), thickness=0.1).show(10)
+    assert not lines.visible
+
+
+def test_ghost_without_meshes(talos, repaired, tmp_path):
+    urdf = tmp_path / "bare.urdf"
+    text = re.sub(r"<visual>.*?</visual>", "", talos.urdf.read_text(), flags=re.DOTALL)
+    urdf.write_text(text)
+    robot = dataclasses.replace(talos, urdf=urdf)
+    before, *after = repaired
+    recording = scene.record(robot, *after, before=before)
+    objects = Player(recording).at(0.0)
+    drawn = objects["/world/before/robot"]
+    assert np.unique(drawn["colors"].reshape(-1, 3), axis=0).tolist() == [[*scene.COLORS["ghost"]]]
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, before.q[0])
+    places = np.array([placement.translation for placement in data.oMi[2:]])
+    assert_allclose(drawn["points"].reshape(-1, 2, 3)[: len(places), 1], places, atol=1e-6)
 
 
 # ---- Robots without meshes ----
@@ -420,6 +586,33 @@ def test_show(talos, walk, capsys):
         thread.join(30.0)
         assert not thread.is_alive()
     assert capsys.readouterr() == ("", "")
+
+
+def test_the_ghost_can_be_hidden(talos, repaired, monkeypatch):
+    before, *after = repaired
+    shown: list[scene.Scene] = []
+
+    class Kept(scene.Scene):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments)
+            shown.append(self)
+
+    monkeypatch.setattr(scene, "Scene", Kept)
+    addresses: list[str] = []
+    stop = threading.Event()
+    more = {"announce": addresses.append, "stop": stop, "before": before}
+    thread = threading.Thread(target=scene.show, args=(talos, *after), kwargs=more, daemon=True)
+    thread.start()
+    wait_for(lambda: addresses, "the address")
+    with open_page(addresses[0], width=640, height=480) as tab:
+        assert shown[0].ghost.visible
+        tab.get_by_label("Before repair", exact=True).click()
+        wait_for(lambda: not shown[0].ghost.visible, "the ghost to go")
+        tab.get_by_label("Before repair", exact=True).click()
+        wait_for(lambda: shown[0].ghost.visible, "the ghost to come")
+    stop.set()
+    thread.join(30.0)
+    assert not thread.is_alive()
 
 
 def test_show_is_stopped(talos, walk):
