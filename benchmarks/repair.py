@@ -241,8 +241,10 @@ def balance(trial):
 
 
 def print_forces(data, names):
-    head = ["motion", "frames judged", "residual before [N]", "after [N]"]
-    head += ["off the measured before [N]", "after [N]", "root [mm]", "CoM [mm]", "joints [°]"]
+    head = ["motion", "frames judged"]
+    for what in ("beyond contacts", "off measured"):
+        head += [f"{what}, {when} [N]" for when in ("before", "after")]
+    head += ["root [mm]", "CoM [mm]", "joints [°]"]
     print_head(head)
     for path in sorted((data / "forces").glob("*.npz")):
         if not names or any(name in path.stem for name in names):
