@@ -79,14 +79,19 @@ SAMPLES = (
 )
 
 
-def analyze_sample(sample, data):
-    """What dynacom finds of a clip at the default settings; `data` is ../shared/data.
+def analyze_sample(sample, data, options=None):
+    """What dynacom finds of a clip; `data` is ../shared/data.
+
+    Args:
+        options: AnalysisOptions; None for the defaults.
 
     Raises:
         DynacomError: the clip cannot be read.
     """
     robot = load_robot(sample.robot, data / "clips")
-    return dynacom.analyze(data / sample.path, robot, sensitivity=False, **sample.options)
+    return dynacom.analyze(
+        data / sample.path, robot, options=options, sensitivity=False, **sample.options
+    )
 
 
 def bound_force(report):

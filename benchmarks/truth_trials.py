@@ -106,17 +106,28 @@ def read_trial(path):
     )
 
 
+def find_sliding(model):
+    """Which components of changes of configurations are of the root's place or joints that slide
+    [m], not turn [rad]: (nv,), bool."""
+    sliding = np.zeros(model.nv, dtype=bool)
+    sliding[:3] = True
+    for joint in list(model.joints)[2:]:
+        if joint.shortname().startswith("JointModelP"):
+            sliding[joint.idx_v : joint.idx_v + joint.nv] = True
+    return sliding
+
+
+def add_noise(model, q, sliding, turning, seed=0):
+    """Configurations (T, nq) with white noise: on the root's place and what slides [m], and on what
+    turns [rad]."""
+    scale = np.where(find_sliding(model), sliding, turning)
+    steps = scale * np.random.default_rng(seed).standard_normal((len(q), model.nv))
+    return np.array([pinocchio.integrate(model, *pair) for pair in zip(q, steps, strict=True)])
+
+
 def with_noise(trial, seed=0):
     """The trial with noise on its configurations."""
-    model = trial.robot.model
-    scale = np.full(model.nv, NOISE[1])
-    scale[:3] = NOISE[0]
-    for joint in list(model.joints)[2:]:
-        if joint.shortname().startswith("JointModelP"):  # it slides
-            scale[joint.idx_v : joint.idx_v + joint.nv] = NOISE[0]
-    steps = scale * np.random.default_rng(seed).standard_normal((len(trial.q), model.nv))
-    q = [pinocchio.integrate(model, q, step) for q, step in zip(trial.q, steps, strict=True)]
-    return replace(trial, q=np.array(q))
+    return replace(trial, q=add_noise(trial.robot.model, trial.q, *NOISE, seed))
 
 
 def measured_schedule(trial):

@@ -25,7 +25,10 @@ HALF_LENGTH, HALF_WIDTH = 0.1, 0.05
 FEET = ("left", "right")
 
 _LEG = """
-  <link name="{name}_x"/><link name="{name}_y"/><link name="{name}_foot"/>
+  <link name="{name}_x"/><link name="{name}_y"/>
+  <link name="{name}_foot"><inertial><mass value="{mass}"/>
+    <inertia ixx="{inertia}" iyy="{inertia}" izz="{inertia}" ixy="0" ixz="0" iyz="0"/>
+  </inertial></link>
   <joint name="{name}_jx" type="prismatic"><parent link="body"/><child link="{name}_x"/>
     <axis xyz="1 0 0"/><limit lower="-99" upper="99" effort="1" velocity="99"/></joint>
   <joint name="{name}_jy" type="prismatic"><parent link="{name}_x"/><child link="{name}_y"/>
@@ -43,9 +46,14 @@ contacts:
 """
 
 
-def make_puppet(folder: Path) -> Robot:
-    """Two soles, left and right, that go wherever they are put, below a body of 30 kg."""
-    legs = "".join(_LEG.format(name=name) for name in FEET)
+def make_puppet(folder: Path, sole: float = 0.0) -> Robot:
+    """Two soles, left and right, that go wherever they are put, below a body of 30 kg.
+
+    Args:
+        sole: the mass of each [kg]; if there is one, motions are no longer possible by
+            construction, but close to that.
+    """
+    legs = "".join(_LEG.format(name=name, mass=sole, inertia=0.01 * sole) for name in FEET)
     (folder / "puppet.urdf").write_text(
         '<robot name="puppet"><link name="body"><inertial><mass value="30"/>'
         '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
