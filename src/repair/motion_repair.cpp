@@ -140,6 +140,7 @@ class Footwork {
     pinocchio::Data data(problem.model);
     const Index frames = problem.time.size();
     problem.targets.assign(problem.points.size(), Eigen::Matrix3Xd(3, frames));
+    problem.held = problem.sets;
     placements_.resize(problem.points.size());
     for (Index frame = 0; frame < frames; ++frame) {
       pinocchio::forwardKinematics(problem.model, data, problem.q.col(frame));
@@ -169,12 +170,30 @@ class Footwork {
       }
       first_part = part;
     }
+    if (settings_.feet) arrive();
     if (settings_.feet && ground_.height.rows() > 0) clear();
     return stances;
   }
 
  private:
   std::uint32_t setOf(Index frame) const { return problem_.sets[static_cast<std::size_t>(frame)]; }
+
+  // Parts are where they carry one frame before, and after, too: who lands or leaves does so at
+  // rest.
+  void arrive() {
+    const Index frames = problem_.time.size();
+    for (Index frame = 0; frame < frames; ++frame)
+      for (std::size_t part = 0; part < problem_.points.size(); ++part) {
+        const auto carriesAt = [&](Index k) {
+          return k >= 0 && k < frames && (setOf(k) >> part & 1u);
+        };
+        if (carriesAt(frame) || carriesAt(frame - 1) == carriesAt(frame + 1)) continue;
+        const Index there = carriesAt(frame - 1) ? frame - 1 : frame + 1;
+        problem_.held[static_cast<std::size_t>(frame)] |= std::uint32_t(1) << part;
+        problem_.targets[part].col(frame) =
+            problem_.targets[part].col(there) + moved(frame) - moved(there);
+      }
+  }
 
   // Parts in the air keep above the ground under them, and those of a contact none of whose parts
   // carries as far as it can get from one stance to the next.
@@ -277,11 +296,12 @@ class Footwork {
       slowest = k;
     }
     for (Index k = slowest; k + 1 < behind - first; ++k)
-      slow[std::size_t(k + 1)] = follow(path[std::size_t(k)], slow[std::size_t(k)],
-                                        path[std::size_t(k + 1)], bothOf(k), stepAt(first + k));
+      slow[std::size_t(k + 1)] =
+          follow(path[std::size_t(k)], slow[std::size_t(k)], path[std::size_t(k + 1)], mask,
+                 bothOf(k), stepAt(first + k));
     for (Index k = slowest; k > 0; --k)
       slow[std::size_t(k - 1)] =
-          follow(path[std::size_t(k)], slow[std::size_t(k)], path[std::size_t(k - 1)],
+          follow(path[std::size_t(k)], slow[std::size_t(k)], path[std::size_t(k - 1)], mask,
                  bothOf(k - 1), stepAt(first + k - 1));
     return slow;
   }
@@ -290,7 +310,8 @@ class Footwork {
 
   // What follows a placement `there` that was `here`, if what carries slides no faster than it may.
   pinocchio::SE3 follow(const pinocchio::SE3& here, const pinocchio::SE3& slow_here,
-                        const pinocchio::SE3& there, std::uint32_t carrying, double time) const {
+                        const pinocchio::SE3& there, std::uint32_t mask, std::uint32_t carrying,
+                        double time) const {
     const auto limit = [](double value, double largest) {
       return std::clamp(value, -largest, largest);
     };
@@ -303,7 +324,7 @@ class Footwork {
     const Eigen::Vector3d middle = centre(carrying, there),
                           slow_middle = centre(carrying, slow_here);
     double lever = 0.;
-    for (std::uint32_t rest = carrying; rest != 0; rest &= rest - 1)
+    for (std::uint32_t rest = mask; rest != 0; rest &= rest - 1)
       lever = std::max(
           lever, (locate(static_cast<std::size_t>(__builtin_ctz(rest)), there) - middle).norm());
     const double largest = 0.5 * settings_.slide_speed * time;
@@ -397,7 +418,7 @@ double measure(const WholeBodyProblem& problem, const Eigen::MatrixXd& q, Repair
     linearizer.evaluate(problem.time, q, frame, needed);
     for (std::size_t part = 0; part < problem.points.size(); ++part) {
       const auto place = needed.points.col(Index(part));
-      if (set >> part & 1u)
+      if (problem.held[static_cast<std::size_t>(frame)] >> part & 1u)
         found.held_largest =
             std::max(found.held_largest, (place - problem.targets[part].col(frame)).norm());
       else if (problem.floor.rows() > 0)  // std::max() leaves what is not known
@@ -509,6 +530,7 @@ RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
       motion.time,
       motion.q,
       internal::listSets(parts.parts, schedule, frames),
+      {},
       {},
       {},
       free,

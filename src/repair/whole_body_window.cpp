@@ -57,11 +57,11 @@ WholeBodyWindow::WholeBodyWindow(const WholeBodyProblem& problem, const RepairSe
   for (const double mu : problem.mu) mu_.push_back(mu * (1. - settings.friction_margin));
 }
 
-// Of a point that pushes, all three coordinates count, of a lifted one its height.
+// Of a point that is held, all three coordinates count, of a lifted one its height.
 template <class Function>
 void WholeBodyWindow::forEachRow(const Constraint& constraint, Function act) const {
   if (!isSought(constraint.frame)) return;
-  forEachPoint(problem_.sets[static_cast<std::size_t>(constraint.frame)],
+  forEachPoint(problem_.held[static_cast<std::size_t>(constraint.frame)],
                [&](Index point) { act(point, Index(0), Index(3)); });
   forEachPoint(constraint.lifted, [&](Index point) { act(point, Index(2), Index(1)); });
 }
@@ -143,7 +143,8 @@ double WholeBodyWindow::linearize(const Eigen::MatrixXd& q) {
     const Index frame = constraint.frame;
     const std::uint32_t set = problem_.sets[static_cast<std::size_t>(frame)];
     LinearizedFrame& linear = constraint.linear;
-    linearizer_.linearize(problem_.time, q, frame, set, linear);
+    linearizer_.linearize(problem_.time, q, frame,
+                          set | problem_.held[static_cast<std::size_t>(frame)], linear);
     place(constraint);
     constraint.moved = linear.wrench;
     if (!problem_.free[frame]) {
@@ -160,7 +161,7 @@ double WholeBodyWindow::linearize(const Eigen::MatrixXd& q) {
 void WholeBodyWindow::place(Constraint& constraint) {
   const Index frame = constraint.frame;
   constraint.off.setZero(3, constraint.linear.points.cols());
-  forEachPoint(problem_.sets[static_cast<std::size_t>(frame)], [&](Index point) {
+  forEachPoint(problem_.held[static_cast<std::size_t>(frame)], [&](Index point) {
     constraint.off.col(point) = constraint.linear.points.col(point) -
                                 problem_.targets[static_cast<std::size_t>(point)].col(frame);
   });
@@ -171,11 +172,11 @@ void WholeBodyWindow::place(Constraint& constraint) {
 // below, and what is above needs none.
 void WholeBodyWindow::lift(Constraint& constraint) {
   const Index frame = constraint.frame;
-  const std::uint32_t set = problem_.sets[static_cast<std::size_t>(frame)];
+  const std::uint32_t held = problem_.held[static_cast<std::size_t>(frame)];
   constraint.lifted = 0;
   for (Index point = 0; point < problem_.floor.rows(); ++point) {
     const double height = constraint.linear.points(2, point) - problem_.floor(point, frame);
-    if (set >> point & 1u || !(height < 0.)) continue;
+    if (held >> point & 1u || !(height < 0.)) continue;
     constraint.off(2, point) = height;
     constraint.lifted |= std::uint32_t(1) << point;
   }

@@ -21,9 +21,10 @@ struct WholeBodyProblem {
   Eigen::VectorXd time;
   Eigen::MatrixXd q;                      // before, nq × frames
   std::vector<std::uint32_t> sets;        // of each frame: a bit for each point that pushes
-  std::vector<Eigen::Matrix3Xd> targets;  // where points are to be that push, 3 × frames each
-  Eigen::MatrixXd floor;  // above which points that do not push are to be, points × frames; NaN
-                          // where that is not known
+  std::vector<std::uint32_t> held;        // the same of points that are to be at their targets
+  std::vector<Eigen::Matrix3Xd> targets;  // where these are to be, 3 × frames each
+  Eigen::MatrixXd floor;  // above which other points are to be, points × frames; NaN where that is
+                          // not known
   Eigen::Array<bool, Eigen::Dynamic, 1> free;  // frames whose wrench is not asked for
   Eigen::VectorXd of_change, of_acceleration;  // costs of squares, nv
   std::vector<LimitedJoint> joints;            // that are to be within their limits
@@ -55,7 +56,7 @@ class WholeBodyWindow {
   struct Constraint {
     Eigen::Index frame;
     LinearizedFrame linear;
-    std::uint32_t lifted = 0;  // points that do not push, and are below their floor
+    std::uint32_t lifted = 0;  // points that are not held, and are below their floor
     Eigen::Matrix3Xd off;      // of points from their targets; of lifted ones, z only counts
     Vector6 moved, given, dual;
     ConeProjection::Answer answer;
