@@ -25,6 +25,7 @@ const char* getMeaning(const std::string& field) {
       {"held_point", "An active part that is so far from its place costs 1 in a second [m]"},
       {"largest_drift", "Contacts that drift by no more than this in a stance are held still [m]"},
       {"slide_speed", "Contacts that drift by more slide no faster than this [m/s]"},
+      {"largest_shift", "By how much contacts are displaced for that at most [m]"},
       {"clearance", "How high above the ground contacts that do not carry are at least [m]"},
       {"joint_margin", "How far within their ranges joints stay [rad], [m]"},
       {"speed_margin", "Which part of the speeds of joints is left unused"},

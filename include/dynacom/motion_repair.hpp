@@ -23,10 +23,12 @@ struct DYNACOM_EXPORT RepairSettings {
   /// that a motion that is written and read again is still feasible.
   double friction_margin = 0.02, support_margin = 0.001;
   /// An active part that is so far from its place costs 1 in a second [m].
-  double held_point = 0.0002;
+  double held_point = 0.0005;
   /// A contact that moves by no more than this in a stance stands still in it, where it is on
-  /// average [m]; one that drifts by more slides as it did, but no faster than the second [m/s].
-  double largest_drift = 0.02, slide_speed = 0.1;
+  /// average [m]. One that drifts by more slides as it did, but no faster than the second [m/s], or
+  /// 1.8 times as fast, as long as that keeps it within the third of where it was [m]; else it
+  /// slides in earnest, and goes on so.
+  double largest_drift = 0.02, slide_speed = 0.1, largest_shift = 0.1;
   /// How high above the ground a contact that does not carry is at least, as far as it can get
   /// there from one stance to the next [m].
   double clearance = 0.01;

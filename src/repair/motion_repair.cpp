@@ -36,6 +36,7 @@ const std::vector<RepairSettings::Field>& RepairSettings::fields() {
       {"held_point", &RepairSettings::held_point},
       {"largest_drift", &RepairSettings::largest_drift},
       {"slide_speed", &RepairSettings::slide_speed},
+      {"largest_shift", &RepairSettings::largest_shift},
       {"clearance", &RepairSettings::clearance},
       {"joint_margin", &RepairSettings::joint_margin},
       {"speed_margin", &RepairSettings::speed_margin},
@@ -90,6 +91,8 @@ using internal::WholeBodyProblem;
 constexpr double kReach = 1e-7;
 // Parts that are no farther from where they are to be stay there [m].
 constexpr double kPlace = 1e-3;
+// By how much faster contacts may slide where they would have to be displaced too far.
+constexpr double kFaster = 1.8;
 
 std::vector<BodyPoint> listPoints(const internal::ContactSplit& parts) {
   std::vector<BodyPoint> points;
@@ -275,13 +278,30 @@ class Footwork {
     return sum / double(__builtin_popcount(parts));
   }
 
-  // Placements of a contact in a stance in which no part slides faster than it may: it stays where
-  // it is slowest, and goes on from there both ways, back to where it was as fast as it may.
-  // Parts slide half of that with their centre, and half around it.
+  // Placements of a contact in a stance in which no part slides faster than it may. Where that
+  // would lead too far from where it was, it may be faster; who slides in earnest goes on as it
+  // did.
   std::vector<pinocchio::SE3> slowDown(std::size_t first_part, std::uint32_t mask, Index first,
                                        Index behind) const {
     const auto begin = placements_[first_part].begin();
     const std::vector<pinocchio::SE3> path(begin + first, begin + behind);
+    for (const double factor : {1., kFaster}) {
+      std::vector<pinocchio::SE3> slow =
+          slowDown(path, mask, first, factor * settings_.slide_speed);
+      double farthest = 0.;
+      for (std::size_t k = 0; k < path.size(); ++k)
+        if (const std::uint32_t set = setOf(first + Index(k)) & mask; set != 0)
+          farthest = std::max(farthest, (centre(set, slow[k]) - centre(set, path[k])).norm());
+      if (farthest <= settings_.largest_shift) return slow;
+    }
+    return path;
+  }
+
+  // It stays where it is slowest, and goes on from there both ways, back to where it was as fast as
+  // it may. Parts slide half of that with their centre, and half around it.
+  std::vector<pinocchio::SE3> slowDown(const std::vector<pinocchio::SE3>& path, std::uint32_t mask,
+                                       Index first, double speed_limit) const {
+    const Index behind = first + Index(path.size());
     std::vector<pinocchio::SE3> slow = path;
     const auto bothOf = [&](Index k) { return setOf(first + k) & setOf(first + k + 1) & mask; };
     Index slowest = 0;
@@ -298,11 +318,11 @@ class Footwork {
     for (Index k = slowest; k + 1 < behind - first; ++k)
       slow[std::size_t(k + 1)] =
           follow(path[std::size_t(k)], slow[std::size_t(k)], path[std::size_t(k + 1)], mask,
-                 bothOf(k), stepAt(first + k));
+                 bothOf(k), speed_limit * stepAt(first + k));
     for (Index k = slowest; k > 0; --k)
       slow[std::size_t(k - 1)] =
           follow(path[std::size_t(k)], slow[std::size_t(k)], path[std::size_t(k - 1)], mask,
-                 bothOf(k - 1), stepAt(first + k - 1));
+                 bothOf(k - 1), speed_limit * stepAt(first + k - 1));
     return slow;
   }
 
@@ -311,7 +331,7 @@ class Footwork {
   // What follows a placement `there` that was `here`, if what carries slides no faster than it may.
   pinocchio::SE3 follow(const pinocchio::SE3& here, const pinocchio::SE3& slow_here,
                         const pinocchio::SE3& there, std::uint32_t mask, std::uint32_t carrying,
-                        double time) const {
+                        double farthest) const {
     const auto limit = [](double value, double largest) {
       return std::clamp(value, -largest, largest);
     };
@@ -327,7 +347,7 @@ class Footwork {
     for (std::uint32_t rest = mask; rest != 0; rest &= rest - 1)
       lever = std::max(
           lever, (locate(static_cast<std::size_t>(__builtin_ctz(rest)), there) - middle).norm());
-    const double largest = 0.5 * settings_.slide_speed * time;
+    const double largest = 0.5 * farthest;
     const double yaw = yawOf(there.rotation() * here.rotation().transpose());
     const double other_extra =
         extra - yaw + (lever > 0. ? limit(yaw - extra, largest / lever) : yaw - extra);

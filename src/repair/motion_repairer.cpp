@@ -239,20 +239,24 @@ class MotionRepairer::Workspace::Ladder {
            summarizeJoints(model(), change).largest <= settings_.largest_turn;
   }
 
-  // Repairs with the contacts that were found, and with those that are found then, until they give
-  // all that is needed.
+  // Repairs with the contacts that were found. Where these are others then, and cannot give what is
+  // needed, it does so once more with those, near such frames, and so on.
   Attempt repeat(const RepairSettings& settings, const MotionExamination& contacts,
                  const Eigen::MatrixXd& start) const {
-    Attempt best;
-    Attempt last;
+    Attempt best, last;
+    ContactSchedule schedule;
     for (int round = 0; round < settings_.rounds; ++round) {
       const MotionExamination& used = round == 0 ? contacts : last.found;
+      if (round == 0 || schedule.names != used.inference.schedule.names)
+        schedule = used.inference.schedule;
+      else
+        adopt(used, schedule);
       const PartRobot parts = splitContacts(workspace_.robot, used.links);
       RepairGround ground;
       if (settings.feet) ground = findRepairGround(parts.parts, used.inference, recorded_.time);
       RepairedMotion repaired =
-          repairMotion(parts, found_.before.derived.motion, used.inference.schedule, settings, {},
-                       ground, round == 0 ? start : last.repaired.motion.q);
+          repairMotion(parts, found_.before.derived.motion, schedule, settings, {}, ground,
+                       round == 0 ? start : last.repaired.motion.q);
       MotionExamination found = workspace_.exact.examine(write(repaired.motion.q));
       const Index missing = countMissing(found);
       last = {std::move(repaired), std::move(found), missing};
@@ -260,6 +264,19 @@ class MotionRepairer::Workspace::Ladder {
       if (last.missing == 0 && (!settings.feet || last.found.verdict.isFeasible())) break;
     }
     return best;
+  }
+
+  // Takes contacts that were found around frames in which they cannot give what is needed.
+  static void adopt(const MotionExamination& found, ContactSchedule& schedule) {
+    constexpr Index kAround = 3;
+    const Index frames = schedule.active.cols();
+    for (Index frame = 0; frame < frames; ++frame) {
+      if (!isMissing(found, frame)) continue;
+      const Index first = std::max<Index>(frame - kAround, 0);
+      const Index count = std::min(frame + kAround + 1, frames) - first;
+      schedule.active.middleCols(first, count) =
+          found.inference.schedule.active.middleCols(first, count);
+    }
   }
 
   static bool isBetter(const Attempt& one, const Attempt& other) {

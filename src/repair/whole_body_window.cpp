@@ -18,8 +18,10 @@ namespace {
 // then.
 constexpr double kPenalty = 2000., kFlight = 300., kRelaxation = 1.6;
 constexpr int kRounds = 2, kIterations = 12;
-// Then, costs count no more: the nearest motion within the cones, with larger penalties, of what
-// parts and joints are off, too.
+// How often it does where feet or joints have to be moved, which is farther.
+constexpr int kFarRounds = 4;
+// Then, costs count no more: the nearest motion within the cones, in which points and joints that
+// are held stay as they are, with larger penalties.
 constexpr double kPolish = 100., kPolishPlaces = 100.;
 constexpr int kPolishes = 8, kPolishIterations = 8;
 // What is missing after that is rounding [m g, m g·m]: with more, distributions are not Solved.
@@ -69,7 +71,8 @@ void WholeBodyWindow::forEachRow(const Constraint& constraint, Function act) con
 void WholeBodyWindow::solve(Index first, Index behind, Index asked, Eigen::MatrixXd& change,
                             Eigen::MatrixXd& q) {
   begin(first, behind, asked);
-  for (int round = 0; round < kRounds; ++round) {
+  const bool is_far = !problem_.joints.empty() || problem_.floor.rows() > 0;
+  for (int round = 0; round < (is_far ? kFarRounds : kRounds); ++round) {
     linearize(q);
     if (round == 0) restart();
     if (!factorize(kPenalty, 1.)) return;
@@ -95,6 +98,7 @@ void WholeBodyWindow::polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q) {
     }
     if (best <= kReached || failed == kFailures || round == kPolishes) break;
     restart();
+    stay();
     if (!factorize(kPenalty * kPolish, kPolishPlaces)) break;
     for (int k = 0; k < kPolishIterations; ++k) {
       iterate(false, change);
@@ -104,6 +108,12 @@ void WholeBodyWindow::polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q) {
   }
   change.middleCols(first_, behind_ - first_) = best_change;
   q.middleCols(first_, behind_ - first_) = best_q;
+}
+
+// Lets points and joints that are held be so where they are.
+void WholeBodyWindow::stay() {
+  for (Constraint& constraint : constraints_) constraint.off.setZero();
+  for (Pin& pin : pins_) pin.off = 0.;
 }
 
 // The frames whose wrench depends on what is sought, and of which something is asked.

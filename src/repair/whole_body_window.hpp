@@ -80,6 +80,7 @@ class WholeBodyWindow {
   void pin(const Eigen::MatrixXd& q);
   double step(const Pin& pin) const;
   void polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q);
+  void stay();
   bool factorize(double penalty, double penalty_of_places);
   void addPins();
   void addCosts(const Eigen::MatrixXd& change);
