@@ -32,6 +32,7 @@ const char* getMeaning(const std::string& field) {
       {"feet", "Whether contacts stand still, level with their ground, and parts keep above it"},
       {"joints", "Whether joints keep within their positions and velocities"},
       {"pinned_ends", "Whether the first and the last configuration stay as they are"},
+      {"anew", "Whether all is found anew although a start is given, or what is out of reach only"},
       {"window", "Longer motions are repaired in windows of this length [s]"},
       {"overlap", "Windows find so much beyond their end, which the next one finds anew [s]"},
   };

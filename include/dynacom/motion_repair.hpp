@@ -34,7 +34,7 @@ struct DYNACOM_EXPORT RepairSettings {
   double clearance = 0.01;
   /// How far within their ranges joints stay [rad], [m], and which part of their speeds is left
   /// unused.
-  double joint_margin = 0.001, speed_margin = 0.01;
+  double joint_margin = 0.002, speed_margin = 0.01;
   /// Longer motions are repaired in windows of this length; each also finds so much beyond its end,
   /// which the next one finds anew [s].
   double window = 10., overlap = 2.;
@@ -42,6 +42,8 @@ struct DYNACOM_EXPORT RepairSettings {
   /// whether joints keep within their positions and velocities; and whether the first and the last
   /// configuration stay as they are.
   bool feet = true, joints = true, pinned_ends = false;
+  /// Whether all is found anew although a start is given; else only what is out of reach there.
+  bool anew = true;
 
   using Field = std::pair<const char*, double RepairSettings::*>;
   using Switch = std::pair<const char*, bool RepairSettings::*>;

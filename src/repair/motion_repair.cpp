@@ -51,6 +51,7 @@ const std::vector<RepairSettings::Switch>& RepairSettings::switches() {
       {"feet", &RepairSettings::feet},
       {"joints", &RepairSettings::joints},
       {"pinned_ends", &RepairSettings::pinned_ends},
+      {"anew", &RepairSettings::anew},
   };
   return all;
 }
@@ -474,7 +475,8 @@ void measureJoints(const WholeBodyProblem& problem, const Eigen::MatrixXd& q,
 
 // Changes begin with those that lead to `start`.
 void repairInWindows(const WholeBodyProblem& problem, const RepairSettings& settings,
-                     const Eigen::MatrixXd& start, Eigen::MatrixXd& change, Eigen::MatrixXd& q) {
+                     const Eigen::MatrixXd& start, bool is_mended, Eigen::MatrixXd& change,
+                     Eigen::MatrixXd& q) {
   internal::WholeBodyWindow window(problem, settings);
   const Eigen::VectorXd& time = problem.time;
   for (Index frame = 0; frame < time.size(); ++frame)
@@ -496,7 +498,10 @@ void repairInWindows(const WholeBodyProblem& problem, const RepairSettings& sett
     if (time[time.size() - 1] - begin <= settings.window + 2. * settings.overlap ||
         time.size() - end < 4)
       behind = asked = time.size();
-    window.solve(first, behind, asked, change, q);
+    if (is_mended)
+      window.mend(first, behind, asked, change, q);
+    else
+      window.solve(first, behind, asked, change, q);
     if (behind == time.size()) return;
     change.middleCols(end, behind - end) = at_start.middleCols(end, behind - end);
     q.middleCols(end, behind - end) = start.middleCols(end, behind - end);
@@ -572,7 +577,9 @@ RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
       settings.joints && std::max(found.joint_excess, found.speed_excess) > 0.;
   if (worst > kReach || std::max(found.held_largest, found.sunk_largest) > kPlace ||
       are_joints_wrong) {
-    repairInWindows(problem, settings, start.size() == 0 ? motion.q : start, found.change, q);
+    const bool is_new = start.size() == 0;
+    repairInWindows(problem, settings, is_new ? motion.q : start, !is_new && !settings.anew,
+                    found.change, q);
     worst = measure(problem, q, found);
     measureJoints(problem, q, found);
   } else {

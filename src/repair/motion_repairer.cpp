@@ -241,7 +241,7 @@ class MotionRepairer::Workspace::Ladder {
 
   // Repairs with the contacts that were found. Where these are others then, and cannot give what is
   // needed, it does so once more with those, near such frames, and so on.
-  Attempt repeat(const RepairSettings& settings, const MotionExamination& contacts,
+  Attempt repeat(RepairSettings settings, const MotionExamination& contacts,
                  const Eigen::MatrixXd& start) const {
     Attempt best, last;
     ContactSchedule schedule;
@@ -260,6 +260,7 @@ class MotionRepairer::Workspace::Ladder {
       MotionExamination found = workspace_.exact.examine(write(repaired.motion.q));
       const Index missing = countMissing(found);
       last = {std::move(repaired), std::move(found), missing};
+      settings.anew = false;
       if (round == 0 || isBetter(last, best)) best = last;
       if (last.missing == 0 && (!settings.feet || last.found.verdict.isFeasible())) break;
     }

@@ -19,7 +19,7 @@ namespace {
 constexpr double kPenalty = 2000., kFlight = 300., kRelaxation = 1.6;
 constexpr int kRounds = 2, kIterations = 12;
 // How often it does where feet or joints have to be moved, which is farther.
-constexpr int kFarRounds = 4;
+constexpr int kFarRounds = 5;
 // Then, costs count no more: the nearest motion within the cones, in which points and joints that
 // are held stay as they are, with larger penalties.
 constexpr double kPolish = 100., kPolishPlaces = 100.;
@@ -30,6 +30,10 @@ constexpr double kReached = 1e-10;
 // before: what remains has no solution nearby.
 constexpr double kProgress = 0.7;
 constexpr int kFailures = 2;
+// No wrench depends on frames that are farther away.
+constexpr Index kFarthest = 3;
+// The polish changes frames that are no farther from one in which something is missing [s].
+constexpr double kAround = 0.4;
 // Moments count as forces with this lever [m].
 constexpr double kLever = 1.;
 // A joint that is so far from the limit that it is held at costs 1 in a second [rad], [m].
@@ -82,7 +86,38 @@ void WholeBodyWindow::solve(Index first, Index behind, Index asked, Eigen::Matri
     }
     apply(change, q);
   }
-  polish(change, q);
+  mend(first, behind, asked, change, q);
+}
+
+void WholeBodyWindow::mend(Index first, Index behind, Index asked, Eigen::MatrixXd& change,
+                           Eigen::MatrixXd& q) {
+  const Eigen::VectorXd& time = problem_.time;
+  const Index last = std::min(asked, behind) - 1;
+  Index begun = -1, ended = -1;  // of a span of frames, with what is around them
+  const auto close = [&] {
+    if (begun < 0) return;
+    begin(begun, ended + 1, ended + 1 < behind ? ended + 1 + kFarthest : asked);
+    polish(change, q);
+    begun = -1;
+  };
+  for (Index frame = first; frame <= last; ++frame) {
+    if (begun >= 0 && frame > ended) close();
+    if (findMissing(q, frame) <= kReached) continue;
+    const auto before = std::lower_bound(time.data(), time.data() + frame, time[frame] - kAround);
+    const auto after =
+        std::upper_bound(time.data() + frame, time.data() + last + 1, time[frame] + kAround);
+    if (begun < 0) begun = std::max(first, Index(before - time.data()));
+    ended = Index(after - time.data()) - 1;
+    if (last - ended < kFarthest) ended = behind - 1;
+  }
+  close();
+}
+
+double WholeBodyWindow::findMissing(const Eigen::MatrixXd& q, Index frame) {
+  if (problem_.free[frame]) return 0.;
+  linearizer_.evaluate(problem_.time, q, frame, evaluated_);
+  const std::uint32_t set = problem_.sets[static_cast<std::size_t>(frame)];
+  return findResidual(projection_, evaluated_, problem_.mu, set).norm();
 }
 
 void WholeBodyWindow::polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q) {
@@ -113,7 +148,6 @@ void WholeBodyWindow::polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q) {
 // Lets points and joints that are held be so where they are.
 void WholeBodyWindow::stay() {
   for (Constraint& constraint : constraints_) constraint.off.setZero();
-  for (Pin& pin : pins_) pin.off = 0.;
 }
 
 // The frames whose wrench depends on what is sought, and of which something is asked.
@@ -122,8 +156,6 @@ void WholeBodyWindow::begin(Index first, Index behind, Index asked) {
   behind_ = behind;
   constraints_.clear();
   const Index frames = problem_.time.size();
-  // No wrench depends on frames that are farther away.
-  constexpr Index kFarthest = 3;
   for (Index frame = std::max<Index>(first - kFarthest, 0);
        frame < std::min({behind + kFarthest, frames, asked}); ++frame) {
     const auto [low, high] = MotionLinearizer::findReach(frame, frames);

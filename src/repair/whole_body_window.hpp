@@ -46,6 +46,10 @@ class WholeBodyWindow {
   void solve(Eigen::Index first, Eigen::Index behind, Eigen::Index asked, Eigen::MatrixXd& change,
              Eigen::MatrixXd& q);
 
+  /// Brings frames within reach that are not, whatever it costs, by changes around them.
+  void mend(Eigen::Index first, Eigen::Index behind, Eigen::Index asked, Eigen::MatrixXd& change,
+            Eigen::MatrixXd& q);
+
  private:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   // δ̈ = before δ₋ + here δ + after δ₊, and how long a frame lasts.
@@ -79,6 +83,7 @@ class WholeBodyWindow {
   void shrink(Constraint& constraint);
   void pin(const Eigen::MatrixXd& q);
   double step(const Pin& pin) const;
+  double findMissing(const Eigen::MatrixXd& q, Eigen::Index frame);
   void polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q);
   void stay();
   bool factorize(double penalty, double penalty_of_places);
@@ -106,6 +111,7 @@ class WholeBodyWindow {
   double hold_ = 0., pinch_ = 0.;  // costs of points and joints that are off, as they are now
   BlockBand<Eigen::Dynamic> system_;
   Eigen::MatrixXd step_;
+  LinearizedFrame evaluated_;
 };
 
 /// What points cannot give of a wrench over the weight, by a projection on what they can.
