@@ -16,7 +16,7 @@ namespace dynacom {
 struct DYNACOM_EXPORT RepairSettings {
   /// Displacements of the root and of joints that slide [m], and turns of the root and of joints
   /// [rad], that cost 1 in a second each.
-  double displacement = 0.01, turn = 0.05;
+  double displacement = 0.005, turn = 0.05;
   /// The changes of their accelerations that do [m/s²], [rad/s²].
   double linear_acceleration = 1., angular_acceleration = 25.;
   /// By which part friction is left unused, and how far inside what carries wrenches press [m], so

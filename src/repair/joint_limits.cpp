@@ -19,19 +19,28 @@ std::vector<LimitedJoint> listLimits(const pinocchio::Model& model, double posit
   for (pinocchio::JointIndex index = 1; index < pinocchio::JointIndex(model.njoints); ++index) {
     const auto& joint = model.joints[index];
     if (joint.nq() != 1 || joint.nv() != 1) continue;
-    LimitedJoint limited = {joint.idx_q(), joint.idx_v(), model.lowerPositionLimit[joint.idx_q()],
+    LimitedJoint limited = {joint.idx_q(),
+                            joint.idx_v(),
+                            model.lowerPositionLimit[joint.idx_q()],
                             model.upperPositionLimit[joint.idx_q()],
-                            model.upperVelocityLimit[joint.idx_v()] * (1. - speed_margin)};
+                            model.upperVelocityLimit[joint.idx_v()],
+                            0.,
+                            0.};
     const double range = limited.upper - limited.lower;
     if (range > 0. && std::abs(limited.lower) < kHuge && std::abs(limited.upper) < kHuge) {
-      const double margin = std::min(position_margin, 0.5 * range);
-      limited.lower += margin;
-      limited.upper -= margin;
+      limited.position_margin = std::min(position_margin, 0.5 * range);
+      limited.lower += limited.position_margin;
+      limited.upper -= limited.position_margin;
     } else {
       limited.lower = -kNone;
       limited.upper = kNone;
     }
-    if (!(limited.speed > 0. && limited.speed < kHuge)) limited.speed = kNone;
+    if (limited.speed > 0. && limited.speed < kHuge) {
+      limited.speed_margin = speed_margin * limited.speed;
+      limited.speed -= limited.speed_margin;
+    } else {
+      limited.speed = kNone;
+    }
     joints.push_back(limited);
   }
   return joints;
@@ -44,6 +53,14 @@ double measureExcess(const LimitedJoint& joint, LimitKind kind, const Eigen::Vec
   if (frame + 1 >= time.size()) return -kNone;
   const double step = q(joint.q, frame + 1) - q(joint.q, frame);
   return getSign(kind) * step - joint.speed * (time[frame + 1] - time[frame]);
+}
+
+double measureOwnExcess(const LimitedJoint& joint, LimitKind kind, const Eigen::VectorXd& time,
+                        const Eigen::MatrixXd& q, Eigen::Index frame) {
+  const double excess = measureExcess(joint, kind, time, q, frame);
+  if (!isOfStep(kind)) return excess - joint.position_margin;
+  if (frame + 1 >= time.size()) return excess;
+  return excess - joint.speed_margin * (time[frame + 1] - time[frame]);
 }
 
 }  // namespace dynacom::internal

@@ -9,9 +9,10 @@ namespace dynacom::internal {
 
 /// A joint of one number, and within what it may be.
 struct LimitedJoint {
-  Eigen::Index q, v;    // where it is in configurations and velocities
-  double lower, upper;  // its positions; infinite where there is no limit
-  double speed;         // its largest; infinite where there is no limit
+  Eigen::Index q, v;                     // where it is in configurations and velocities
+  double lower, upper;                   // its positions; infinite where there is no limit
+  double speed;                          // its largest; infinite where there is no limit
+  double position_margin, speed_margin;  // by how much these are less than the joint's own
 };
 
 /// A limit of a joint, of its position in a frame or of the step from it to the next.
@@ -35,5 +36,9 @@ std::vector<LimitedJoint> listLimits(const pinocchio::Model& model, double posit
 /// frame.
 double measureExcess(const LimitedJoint& joint, LimitKind kind, const Eigen::VectorXd& time,
                      const Eigen::MatrixXd& q, Eigen::Index frame);
+
+/// The same of the joint's own limit, without the margin.
+double measureOwnExcess(const LimitedJoint& joint, LimitKind kind, const Eigen::VectorXd& time,
+                        const Eigen::MatrixXd& q, Eigen::Index frame);
 
 }  // namespace dynacom::internal

@@ -53,7 +53,7 @@ constexpr double kGiven = 1e-3;
 // times, and so much more [m], than those of a noisy one.
 constexpr double kFarther = 1.5, kFartherBy = 0.003;
 // Joints that are no farther beyond their limits are within them: so much comes of rounding.
-constexpr double kWithinLimits = 1e-6;
+constexpr double kWithinLimits = 1e-9;
 // By which factors time is stretched.
 constexpr double kStretches[] = {1.1, 1.25, 1.5, 2., 3., 4.};
 

@@ -114,6 +114,10 @@ void WholeBodyWindow::mend(Index first, Index behind, Index asked, Eigen::Matrix
 }
 
 double WholeBodyWindow::findMissing(const Eigen::MatrixXd& q, Index frame) {
+  for (const LimitedJoint& joint : problem_.joints)
+    for (const LimitKind kind : kLimitKinds)
+      if (const double off = measureOwnExcess(joint, kind, problem_.time, q, frame); off > kReached)
+        return off;
   if (problem_.free[frame]) return 0.;
   linearizer_.evaluate(problem_.time, q, frame, evaluated_);
   const std::uint32_t set = problem_.sets[static_cast<std::size_t>(frame)];
@@ -195,8 +199,7 @@ double WholeBodyWindow::linearize(const Eigen::MatrixXd& q) {
     }
     shrink(constraint);
   }
-  pin(q);
-  return worst;
+  return std::max(worst, pin(q));
 }
 
 // Says how far points are from where they are to be.
@@ -225,15 +228,20 @@ void WholeBodyWindow::lift(Constraint& constraint) {
   linearizer_.linearizePoints(constraint.lifted, constraint.linear);
 }
 
-// Finds joints that are beyond a limit; of those within, none needs to be held.
-void WholeBodyWindow::pin(const Eigen::MatrixXd& q) {
+// Finds joints that are beyond a limit, and says how far they are beyond their own at most. Of
+// those within, none needs to be held.
+double WholeBodyWindow::pin(const Eigen::MatrixXd& q) {
   pins_.clear();
+  double largest = 0.;
   for (const LimitedJoint& joint : problem_.joints)
     for (Index frame = first_; frame < behind_; ++frame)
       for (const LimitKind kind : kLimitKinds) {
         const double off = measureExcess(joint, kind, problem_.time, q, frame);
-        if (off > 0.) pins_.push_back({frame, &joint, kind, off});
+        if (!(off > 0.)) continue;
+        pins_.push_back({frame, &joint, kind, off});
+        largest = std::max(largest, measureOwnExcess(joint, kind, problem_.time, q, frame));
       }
+  return largest;
 }
 
 // Makes the cones smaller by the margins, and adds to the derivative of the moment that of the

@@ -81,7 +81,7 @@ class WholeBodyWindow {
   void place(Constraint& constraint);
   void lift(Constraint& constraint);
   void shrink(Constraint& constraint);
-  void pin(const Eigen::MatrixXd& q);
+  double pin(const Eigen::MatrixXd& q);
   double step(const Pin& pin) const;
   double findMissing(const Eigen::MatrixXd& q, Eigen::Index frame);
   void polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q);
