@@ -2,81 +2,16 @@
 #define BOOST_TEST_MODULE motion_repair
 #include <cmath>
 #include <limits>
-#include <optional>
+#include <pinocchio/algorithm/frames.hpp>
+#include <vector>
 
-#include "dynacom/motion_analysis.hpp"
-#include "dynacom/motion_repair.hpp"
-#include "feet.hpp"
-#include "random_robot.hpp"
+#include "swayer.hpp"
 
 using namespace dynacom;
 using namespace dynacom_tests;
 
-namespace {
-
-/// A body of 10 kg above two soles on massless legs, with an arm that turns.
-struct Walker {
-  Walker() {
-    model = singleBody(10., {});
-    addFeet(model);
-    const auto arm = model.addJoint(1, pinocchio::JointModelRY(),
-                                    SE3(Matrix3d::Identity(), Vector3d(0., 0., 0.3)), "arm");
-    model.appendBodyToJoint(arm, pinocchio::Inertia::FromSphere(2., 0.1),
-                            SE3(Matrix3d::Identity(), Vector3d(0.3, 0., 0.)));
-    robot.emplace(model);
-    for (const char* name : {"left", "right"})
-      robot->addContact(makeSole(std::string(name) + "_foot"), name);
-    split.emplace(splitContacts(*robot));
-  }
-
-  /// Stands with its feet side by side.
-  Motion stand(Index frames, double rate = 50.) const {
-    VectorXd q = VectorXd::Zero(model.nq);
-    q[2] = 0.7;
-    q[6] = 1.;
-    q.segment<6>(7) << 0., 0.1, -0.7, 0., -0.1, -0.7;
-    q[13] = 1.5;  // the arm hangs down
-    return differentiate(model, VectorXd::LinSpaced(frames, 0., double(frames - 1) / rate),
-                         q.replicate(1, frames));
-  }
-
-  /// The same, but that the body sways, too fast, and the feet stay where they are.
-  Motion sway(Index frames, double size = 0.06) const {
-    Motion motion = stand(frames);
-    for (Index k = 0; k < frames; ++k) {
-      const double x = size * std::sin(6. * motion.time[k]);
-      motion.q(0, k) += x;
-      motion.q(7, k) -= x;
-      motion.q(10, k) -= x;
-      motion.q(13, k) += 0.3 * std::sin(2. * motion.time[k]);
-    }
-    return differentiate(model, motion.time, motion.q);
-  }
-
-  ContactSchedule schedule(Index frames) const {
-    ContactSchedule schedule;
-    for (const PartRobot::Part& part : split->parts) schedule.names.push_back(part.name);
-    schedule.active.setConstant(Index(schedule.names.size()), frames, true);
-    return schedule;
-  }
-
-  /// How many frames the analysis of a motion does not solve.
-  Index countUnsolved(const Motion& motion, const ContactSchedule& schedule) const {
-    Index count = 0;
-    for (const DistributionStatus status : analyzeMotion(split->robot, motion, schedule).status)
-      if (status != DistributionStatus::Solved) ++count;
-    return count;
-  }
-
-  pinocchio::Model model;
-  std::optional<DynaCoM> robot;
-  std::optional<PartRobot> split;
-};
-
-}  // namespace
-
 BOOST_AUTO_TEST_CASE(what_contacts_can_give_comes_back_as_it_is) {
-  const Walker walker;
+  const Swayer walker;
   const Motion motion = walker.stand(40);
   const RepairedMotion repaired = repairMotion(*walker.split, motion, walker.schedule(40));
   BOOST_TEST(repaired.within_reach);
@@ -92,7 +27,7 @@ BOOST_AUTO_TEST_CASE(what_contacts_can_give_comes_back_as_it_is) {
 }
 
 BOOST_AUTO_TEST_CASE(who_sways_too_fast_is_held_back) {
-  const Walker walker;
+  const Swayer walker;
   const Motion motion = walker.sway(150);
   const ContactSchedule schedule = walker.schedule(150);
   BOOST_TEST(walker.countUnsolved(motion, schedule) > 30);
@@ -109,7 +44,7 @@ BOOST_AUTO_TEST_CASE(who_sways_too_fast_is_held_back) {
 }
 
 BOOST_AUTO_TEST_CASE(in_flight_the_com_follows_its_parabola) {
-  const Walker walker;
+  const Swayer walker;
   Motion motion = walker.stand(60);
   // Up and down as gravity wants it, but for a few centimetres.
   const Index first = 20, behind = 40;
@@ -131,7 +66,7 @@ BOOST_AUTO_TEST_CASE(in_flight_the_com_follows_its_parabola) {
 }
 
 BOOST_AUTO_TEST_CASE(feet_that_skate_a_little_stand_still) {
-  const Walker walker;
+  const Swayer walker;
   Motion motion = walker.sway(100);
   for (Index k = 0; k < 100; ++k) motion.q(7, k) += 0.01 * std::sin(3. * motion.time[k]);
   const ContactSchedule schedule = walker.schedule(100);
@@ -150,7 +85,7 @@ BOOST_AUTO_TEST_CASE(feet_that_skate_a_little_stand_still) {
 }
 
 BOOST_AUTO_TEST_CASE(windows_go_on_where_the_last_one_ended) {
-  const Walker walker;
+  const Swayer walker;
   const Motion motion = walker.sway(500);
   const ContactSchedule schedule = walker.schedule(500);
   RepairSettings whole, windows;
@@ -169,7 +104,7 @@ BOOST_AUTO_TEST_CASE(windows_go_on_where_the_last_one_ended) {
 }
 
 BOOST_AUTO_TEST_CASE(a_mirrored_motion_is_repaired_to_a_mirrored_one) {
-  const Walker walker;
+  const Swayer walker;
   Motion motion = walker.sway(100);
   for (Index k = 0; k < 100; ++k) {
     const double y = 0.05 * std::sin(5. * motion.time[k]);
@@ -193,7 +128,7 @@ BOOST_AUTO_TEST_CASE(a_mirrored_motion_is_repaired_to_a_mirrored_one) {
 }
 
 BOOST_AUTO_TEST_CASE(nothing_is_asked_of_frames_that_are_free) {
-  const Walker walker;
+  const Swayer walker;
   const Motion motion = walker.sway(100);
   const ContactSchedule schedule = walker.schedule(100);
   Eigen::Array<bool, Eigen::Dynamic, 1> free(100);
@@ -216,8 +151,184 @@ BOOST_AUTO_TEST_CASE(nothing_is_asked_of_frames_that_are_free) {
   BOOST_TEST(half.root_rms < repairMotion(*walker.split, motion, schedule).root_rms);
 }
 
+BOOST_AUTO_TEST_CASE(feet_come_down_to_their_ground_and_up_from_below_it) {
+  const Swayer walker;
+  Motion motion = walker.sway(100);
+  motion.q.row(9).array() += 0.004;  // the left one floats
+  // The right one is in the air for a while, and sinks in there.
+  const Index first = 40, behind = 70;
+  ContactSchedule schedule = walker.schedule(100);
+  schedule.active.middleCols(first, behind - first).bottomRows(4).setConstant(false);
+  for (Index k = first; k < behind; ++k) {
+    const double part = double(k - first + 1) / double(behind - first + 1);
+    motion.q(12, k) -= 0.006 * std::sin(M_PI * part);
+  }
+  RepairGround ground;
+  ground.height.setZero(8, 100);
+  const RepairedMotion repaired = repairMotion(*walker.split, motion, schedule, {}, {}, ground);
+  BOOST_TEST(repaired.within_reach);
+  const RepairSettings settings;
+  pinocchio::Data data(walker.model);
+  for (Index frame = 0; frame < 100; ++frame) {
+    pinocchio::framesForwardKinematics(walker.model, data, repaired.motion.q.col(frame));
+    const auto heightOf = [&](const char* foot) {
+      return data.oMf[walker.model.getFrameId(foot)].translation().z();
+    };
+    BOOST_TEST(std::abs(heightOf("left_foot")) < 1e-3);
+    const bool flies = frame >= first && frame < behind;
+    if (!flies)
+      BOOST_TEST(std::abs(heightOf("right_foot")) < 1e-3);
+    else
+      BOOST_TEST(heightOf("right_foot") > -1e-3);
+    if (frame > first + 8 && frame < behind - 8)
+      BOOST_TEST(heightOf("right_foot") > settings.clearance - 1e-3);
+  }
+  BOOST_TEST(repaired.held_largest < 1e-3);
+  BOOST_TEST(repaired.sunk_largest < 1e-3);
+}
+
+BOOST_AUTO_TEST_CASE(on_a_treadmill_feet_move_with_the_ground) {
+  const Swayer walker;
+  Motion motion = walker.sway(100);
+  // All of it is carried along, and the left foot skates besides.
+  const double speed = -0.4;
+  for (Index k = 0; k < 100; ++k) {
+    motion.q(0, k) += speed * motion.time[k];
+    motion.q(7, k) += 0.01 * std::sin(3. * motion.time[k]);
+  }
+  RepairGround ground;
+  ground.height.setZero(8, 100);
+  ground.velocity.x() = speed;
+  const ContactSchedule schedule = walker.schedule(100);
+  const RepairedMotion repaired = repairMotion(*walker.split, motion, schedule, {}, {}, ground);
+  BOOST_TEST(repaired.within_reach);
+  BOOST_TEST(repaired.stances[0].is_still);
+  BOOST_TEST(repaired.stances[1].drift < 1e-9);
+  BOOST_TEST(repaired.held_largest < 1e-3);
+}
+
+BOOST_AUTO_TEST_CASE(who_slides_too_far_to_stand_still_does_so_slowly) {
+  const Swayer walker;
+  Motion motion = walker.sway(100);
+  // 5 cm within a fifth of a second.
+  for (Index k = 0; k < 100; ++k) motion.q(7, k) += 0.025 * std::tanh((motion.time[k] - 1.) / 0.05);
+  const ContactSchedule schedule = walker.schedule(100);
+  RepairGround ground;
+  ground.height.setZero(8, 100);
+  const RepairSettings settings;
+  const auto findSpeed = [&](const Motion& some) {
+    const Eigen::MatrixXd feet = some.q.row(0) + some.q.row(7);
+    return (feet.rightCols(99) - feet.leftCols(99)).cwiseAbs().maxCoeff() * 50.;
+  };
+  BOOST_TEST(findSpeed(motion) > 0.4);
+  const RepairedMotion repaired =
+      repairMotion(*walker.split, motion, schedule, settings, {}, ground);
+  BOOST_TEST(repaired.within_reach);
+  BOOST_TEST(!repaired.stances[0].is_still);
+  BOOST_TEST(findSpeed(repaired.motion) < 1.5 * settings.slide_speed);
+}
+
+BOOST_AUTO_TEST_CASE(joints_stay_within_their_positions_and_velocities) {
+  Swayer walker;
+  Motion motion = walker.sway(150);
+  // The arm turns by 1.5 ± 0.3 rad, at up to 0.6 rad/s.
+  walker.model.lowerPositionLimit[13] = 1.4;
+  walker.model.upperPositionLimit[13] = 1.7;
+  walker.model.upperVelocityLimit[12] = 0.55;
+  walker.split.emplace(splitContacts([&] {
+    DynaCoM robot(walker.model);
+    for (const char* name : {"left", "right"})
+      robot.addContact(makeSole(std::string(name) + "_foot"), name);
+    return robot;
+  }()));
+  const ContactSchedule schedule = walker.schedule(150);
+  const RepairedMotion repaired = repairMotion(*walker.split, motion, schedule);
+  BOOST_TEST(repaired.within_reach);
+  BOOST_TEST(repaired.motion.q.row(13).minCoeff() >= 1.4);
+  BOOST_TEST(repaired.motion.q.row(13).maxCoeff() <= 1.7);
+  BOOST_TEST(repaired.motion.q.row(13).maxCoeff() > 1.69);  // no farther than it must
+  const Eigen::RowVectorXd steps =
+      repaired.motion.q.row(13).tail(149) - repaired.motion.q.row(13).head(149);
+  BOOST_TEST(steps.cwiseAbs().maxCoeff() * 50. <= 0.55 + 1e-9);
+  BOOST_TEST(repaired.joint_excess == 0.);
+  BOOST_TEST(repaired.speed_excess == 0.);
+  RepairSettings settings;
+  settings.joints = false;
+  const RepairedMotion other = repairMotion(*walker.split, motion, schedule, settings);
+  BOOST_TEST(other.joint_excess > 0.05);
+  BOOST_TEST(other.speed_excess > 0.05);
+}
+
+BOOST_AUTO_TEST_CASE(ends_stay_where_they_are_pinned) {
+  const Swayer walker;
+  const Motion motion = walker.sway(150);
+  const ContactSchedule schedule = walker.schedule(150);
+  RepairSettings settings;
+  settings.pinned_ends = true;
+  const RepairedMotion repaired = repairMotion(*walker.split, motion, schedule, settings);
+  BOOST_TEST(repaired.within_reach);
+  BOOST_TEST(repaired.root_rms > 1e-4);
+  BOOST_TEST(repaired.change.col(0).norm() < 1e-6);
+  BOOST_TEST(repaired.change.col(149).norm() < 1e-6);
+  BOOST_TEST(repairMotion(*walker.split, motion, schedule).change.col(149).norm() > 1e-4);
+}
+
+BOOST_AUTO_TEST_CASE(what_begins_near_the_end_is_only_mended) {
+  const Swayer walker;
+  const Motion motion = walker.sway(150);
+  const ContactSchedule schedule = walker.schedule(150);
+  const RepairedMotion repaired = repairMotion(*walker.split, motion, schedule);
+  // One frame is pushed off, and found back; far from it nothing moves.
+  Eigen::MatrixXd start = repaired.motion.q;
+  start(0, 75) += 0.0003;
+  RepairSettings settings;
+  settings.anew = false;
+  const RepairedMotion mended =
+      repairMotion(*walker.split, motion, schedule, settings, {}, {}, start);
+  BOOST_TEST(mended.within_reach);
+  BOOST_TEST((mended.motion.q.leftCols(40) == start.leftCols(40)));
+  BOOST_TEST((mended.motion.q.rightCols(40) == start.rightCols(40)));
+  BOOST_TEST(mended.root_largest < repaired.root_largest + 0.004);
+}
+
+BOOST_AUTO_TEST_CASE(stances_at_nearly_one_height_are_on_one_level) {
+  const Swayer walker;
+  const std::vector<PartRobot::Part>& parts = walker.split->parts;
+  ContactInference inference;
+  inference.schedule = walker.schedule(100);
+  inference.ground.setZero(8, 100);
+  VectorXd time = VectorXd::LinSpaced(100, 0., 1.98);
+  // The left sole is tilted, its heel 4 cm up; the right one is 1 cm higher than its toes.
+  const auto stand = [&](std::size_t part, double height) {
+    inference.ground.row(Index(part)).setConstant(height);
+    Stance stance = {};
+    stance.part = part;
+    stance.first = stance.begin = 0;
+    stance.behind = stance.end = 100;
+    stance.height = height;
+    stance.on_ground = true;
+    inference.stances.push_back(stance);
+  };
+  for (std::size_t part = 0; part < 8; ++part) {
+    const bool is_rear = parts[part].name.find("rear") != std::string::npos;
+    stand(part, part < 4 ? (is_rear ? 0.04 : 0.) : 0.01);
+  }
+  const RepairGround ground = findRepairGround(parts, inference, time);
+  BOOST_TEST((ground.height.array() == ground.height(0, 0)).all());
+  BOOST_TEST((ground.height(0, 0) == 0. || ground.height(0, 0) == 0.01));
+  // A step is a level of its own.
+  for (Stance& stance : inference.stances)
+    if (stance.part >= 4) stance.height = 0.2;
+  inference.ground.bottomRows(4).setConstant(0.2);
+  const RepairGround step = findRepairGround(parts, inference, time);
+  BOOST_TEST((step.height.topRows(4).array() == 0.).all());
+  BOOST_TEST((step.height.bottomRows(4).array() == 0.2).all());
+  BOOST_TEST(throws<std::invalid_argument>(
+      [&] { findRepairGround(parts, inference, time.head(50)); }, {"inference", "50", "100"}));
+}
+
 BOOST_AUTO_TEST_CASE(mistakes_are_named) {
-  const Walker walker;
+  const Swayer walker;
   const Motion motion = walker.stand(10);
   const ContactSchedule schedule = walker.schedule(10);
   RepairSettings settings;

@@ -23,7 +23,7 @@ struct DYNACOM_EXPORT RepairSettings {
   /// that a motion that is written and read again is still feasible.
   double friction_margin = 0.02, support_margin = 0.001;
   /// An active part that is so far from its place costs 1 in a second [m].
-  double held_point = 0.0005;
+  double held_point = 0.0003;
   /// A contact that moves by no more than this in a stance stands still in it, where it is on
   /// average [m]. One that drifts by more slides as it did, but no faster than the second [m/s], or
   /// 1.8 times as fast, as long as that keeps it within the third of where it was [m]; else it

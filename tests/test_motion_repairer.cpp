@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#define BOOST_TEST_MODULE motion_repairer
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "dynacom/motion_repairer.hpp"
+#include "swayer.hpp"
+
+using namespace dynacom;
+using namespace dynacom_tests;
+
+namespace {
+
+RecordedMotion record(const Motion& motion) { return {motion.time, motion.q}; }
+
+Index countUnsolved(const MotionExamination& found) {
+  Index count = 0;
+  for (const DistributionStatus status : found.analysis.status)
+    if (status != DistributionStatus::Solved) ++count;
+  return count;
+}
+
+bool hasReason(const MotionRepair& repair, const std::string& code) {
+  for (const RepairReason& reason : repair.reasons)
+    if (reason.code == code) return true;
+  return false;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(what_is_feasible_stays_as_it_is) {
+  const Swayer walker;
+  const RecordedMotion recorded = record(walker.stand(100));
+  const MotionRepair repair = repairRecordedMotion(*walker.robot, recorded);
+  BOOST_TEST((repair.outcome == RepairOutcome::Feasible));
+  BOOST_TEST((repair.recorded.q == recorded.q));
+  BOOST_TEST(!repair.recorded.is_exact);
+  BOOST_TEST(repair.steps.empty());
+  BOOST_TEST(repair.reasons.empty());
+  BOOST_TEST(repair.root.largest == 0.);
+}
+
+BOOST_AUTO_TEST_CASE(who_sways_too_fast_is_repaired) {
+  const Swayer walker;
+  const RecordedMotion recorded = record(walker.sway(300, 0.09));
+  const MotionRepairer repairer(*walker.robot);
+  const MotionRepair repair = repairer.repair(recorded);
+  BOOST_TEST(!repair.before.verdict.isFeasible());
+  BOOST_TEST(repair.missing_before > 30);
+  BOOST_TEST((repair.outcome == RepairOutcome::Repaired));
+  BOOST_TEST(repair.missing == 0);
+  BOOST_TEST(repair.recorded.is_exact);
+  BOOST_TEST(repair.after.verdict.isFeasible());
+  BOOST_TEST(repair.after.derived.cutoff == 0.);
+  // By an examination that knows nothing of how it was made.
+  ExaminationSettings plain;
+  plain.cutoff = 0.;
+  BOOST_TEST(
+      countUnsolved(examineMotion(*walker.robot, {recorded.time, repair.recorded.q}, plain)) == 0);
+  // It is what the change leads to, which is small.
+  BOOST_TEST(repair.root.largest > 1e-3);
+  BOOST_TEST(repair.root.largest < 0.09);
+  BOOST_TEST(close(repair.recorded.q.topRows(3),
+                   repair.before.derived.motion.q.topRows(3) + repair.change.topRows(3), 1e-3));
+  // And once more, nothing is to be done.
+  const MotionRepair again = repairer.repair(repair.recorded);
+  BOOST_TEST((again.outcome == RepairOutcome::Feasible));
+  BOOST_TEST((again.recorded.q == repair.recorded.q));
+}
+
+BOOST_AUTO_TEST_CASE(strictly_single_frames_are_mended_too) {
+  const Swayer walker;
+  // A few frames out of reach, which a verdict allows.
+  Motion motion = walker.stand(400);
+  for (Index k = 0; k < 400; ++k) {
+    const double s = (motion.time[k] - 4.) / 0.15;
+    const double x = 0.02 * std::exp(-s * s);
+    motion.q(0, k) += x;
+    motion.q(7, k) -= x;
+    motion.q(10, k) -= x;
+  }
+  RepairerSettings settings;
+  const MotionRepair kept = repairRecordedMotion(*walker.robot, record(motion), settings);
+  BOOST_TEST((kept.outcome == RepairOutcome::Feasible));
+  BOOST_TEST(kept.missing_before > 0);
+  settings.strict = true;
+  const MotionRepair mended = repairRecordedMotion(*walker.robot, record(motion), settings);
+  BOOST_TEST((mended.outcome == RepairOutcome::Repaired));
+  BOOST_TEST(mended.missing == 0);
+  BOOST_TEST(mended.root.largest > 0.);
+}
+
+BOOST_AUTO_TEST_CASE(what_cannot_be_is_not_called_repaired) {
+  const Swayer walker;
+  // It hovers, half a metre up, and its feet with it, for a second.
+  Motion motion = walker.stand(250);
+  for (Index k = 0; k < 250; ++k) {
+    const double s = (motion.time[k] - 2.5) / 1.2;
+    motion.q(2, k) += 0.5 * std::exp(-s * s * s * s);
+  }
+  const MotionRepair repair = repairRecordedMotion(*walker.robot, record(motion));
+  BOOST_TEST((repair.outcome == RepairOutcome::NotRepaired));
+  BOOST_TEST(!repair.reasons.empty());
+  BOOST_TEST((hasReason(repair, "contact_needed") || hasReason(repair, "bound") ||
+              hasReason(repair, "flight_with_support_needed")));
+  // Three frames tell nothing.
+  const MotionRepair few = repairRecordedMotion(*walker.robot, record(walker.stand(4)));
+  BOOST_TEST((few.outcome == RepairOutcome::NotRepaired));
+  BOOST_TEST(hasReason(few, "too_short"));
+}
+
+BOOST_AUTO_TEST_CASE(time_is_stretched_where_that_is_allowed) {
+  const Swayer walker;
+  // So far, and so fast, that it would have to be moved more than settings allow.
+  const RecordedMotion recorded = record(walker.sway(300, 0.07));
+  RepairerSettings settings;
+  settings.largest_displacement = 0.005;
+  const MotionRepair fast = repairRecordedMotion(*walker.robot, recorded, settings);
+  BOOST_TEST((fast.outcome == RepairOutcome::NotRepaired));
+  BOOST_TEST(hasReason(fast, "bound"));
+  settings.largest_stretch = 4.;
+  const MotionRepair slow = repairRecordedMotion(*walker.robot, recorded, settings);
+  BOOST_TEST((slow.outcome == RepairOutcome::Repaired));
+  BOOST_TEST(slow.stretch > 1.);
+  BOOST_TEST((slow.steps.front().rung == RepairRung::Time));
+  BOOST_TEST(std::abs(slow.recorded.time[299] - slow.stretch * recorded.time[299]) < 1e-9);
+}
+
+BOOST_AUTO_TEST_CASE(settings_out_of_range_are_named) {
+  RepairerSettings settings;
+  settings.rounds = 0;
+  BOOST_TEST(throws<std::invalid_argument>([&] { settings.validate(); }, {"rounds", "1", "0"}));
+  settings = {};
+  settings.largest_stretch = 0.5;
+  BOOST_TEST(
+      throws<std::invalid_argument>([&] { settings.validate(); }, {"largest_stretch", "0.5"}));
+  settings = {};
+  settings.largest_turn = std::numeric_limits<double>::quiet_NaN();
+  BOOST_TEST(throws<std::invalid_argument>([&] { settings.validate(); }, {"largest_turn"}));
+}
