@@ -355,13 +355,24 @@ def examine(
     Raises:
         DynacomError: as there.
     """
-    schedule, schedule_text = _find_schedule(clip, robot, schedule)
-    recorded = RecordedMotion(clip.time, clip.q, clip.v, clip.a, schedule)
+    recorded, schedule_text = make_recorded(clip, robot, schedule)
     try:
         examination = examiner.examine(recorded)
     except ValueError as error:
         raise DynacomError(f"{clip.path}: {error}") from error
     return MotionReport(clip, robot, options, examination, schedule_text)
+
+
+def make_recorded(
+    clip: Clip, robot: Robot, schedule: str | Path | ContactSchedule | None
+) -> tuple[RecordedMotion, str]:
+    """What is to be examined of a clip, and a sentence on who says when contacts are active.
+
+    Raises:
+        DynacomError: as :func:`read_schedule`.
+    """
+    schedule, text = _find_schedule(clip, robot, schedule)
+    return RecordedMotion(clip.time, clip.q, clip.v, clip.a, schedule, clip.exact), text
 
 
 def _find_schedule(
@@ -481,6 +492,8 @@ def _derivatives_text(clip: Clip, derived: DerivedMotion, options: AnalysisOptio
 
 def _cutoff_text(derived: DerivedMotion) -> str:
     """Why the cut-off is what it is."""
+    if derived.is_told_exact:
+        return "The file is marked as exact, as dynacom repair writes it: it is not filtered."
     if np.isnan(derived.noise):
         return f"There are too few frames to tell how noisy they are: {derived.cutoff:g} Hz."
     noise = f"without a filter, the noise of the accelerations is {derived.noise:.2g} g"
