@@ -61,9 +61,7 @@ class RepairReport:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The summary of `after`, with ``repair``, see docs/repair.md."""
-        return self.after.summary | {
-            "repair": without_nan(repair_summary(self.robot, self.repair))
-        }
+        return self.after.summary | {"repair": without_nan(repair_summary(self.robot, self.repair))}
 
     def write(self, path: str | Path) -> tuple[dict[str, Any], list[str]]:
         """Writes the motion in the format of the clip's file: as it was where nothing was changed.
