@@ -389,6 +389,22 @@ def test_settings_out_of_range(name, value):
         options.validate()
 
 
+def test_the_manual_is_true(root, tmp_path, monkeypatch, capsys):
+    """Its Python runs, and its settings are those that there are, with their defaults."""
+    text = (root / "docs" / "repair.md").read_text(encoding="utf-8")
+    (tmp_path / "examples").symlink_to(root / "examples")
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S)
+    exec(compile(code, "repair.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "repairable -> feasible repaired" in printed
+    assert "{'Solved': 318}" in printed
+    defaults = AnalysisOptions().to_dict()
+    for group in ("repair", "ladder"):
+        rows = dict(re.findall(rf"^\| `{group}\.(\w+)` \| (\S+) \|", text, re.M))
+        assert {name: json.loads(value) for name, value in rows.items()} == defaults[group]
+
+
 # Files.
 
 
