@@ -460,8 +460,28 @@ def test_forces_in_the_file_are_those_of_the_new_motion(talos, tmp_path):
     report.save(tmp_path / "out", page=False)
     again = dynacom.analyze(tmp_path / "out/walk.npz", talos)
     assert again.verdict.outcome == "feasible"
+    assert_array_equal(again.clip.schedule.active, report.after.schedule.active)
+    assert [*again.summary["measured"]] == ["left_sole", "right_sole"]
     for name, compared in again.summary["measured"].items():
         assert_allclose(compared["rms"], 0.0, atol=1e-6, err_msg=name)
+
+
+def test_who_says_when_contacts_carry(talos, tmp_path):
+    """The caller, and then the file does."""
+    with np.load(WALKS / "talos_walk.npz") as file:
+        arrays = {name: file[name] for name in ("t", "q", "contacts", "contact_names")}
+    arrays["t"] = arrays["t"] / 2.0
+    np.savez(tmp_path / "walk.npz", **arrays)
+    active = arrays["contacts"].copy()
+    active[100:110] = True
+    schedule = dynacom.ContactSchedule(["left_sole", "right_sole"], active)
+    assert not np.array_equal(active, arrays["contacts"])
+    report = dynacom.repair(tmp_path / "walk.npz", talos, schedule=schedule)
+    assert report.changed
+    report.save(tmp_path / "out", page=False)
+    assert_array_equal(
+        dynacom.read_motion(tmp_path / "out/walk.npz", talos).schedule.active, active
+    )
 
 
 def test_the_page_shows_what_was_before(hurried, tmp_path):
