@@ -18,7 +18,14 @@ from dynacom.errors import DynacomError
 from dynacom.motion_clip import is_point
 from dynacom.motion_file import Clip, read_motion
 from dynacom.motion_mark import mark_of
-from dynacom.motion_report import FILES, MotionReport, make_examiner, make_recorded, without_nan
+from dynacom.motion_report import (
+    FILES,
+    MotionReport,
+    examine,
+    make_examiner,
+    make_recorded,
+    without_nan,
+)
 from dynacom.motion_writer import write_motion
 from dynacom.repair_change import Before
 from dynacom.repair_summary import repair_summary
@@ -70,15 +77,17 @@ class RepairReport:
             path: the file to write, with the suffix of the clip's.
 
         Returns:
-            What marks it, which is to be written beside it for CSV, see :func:`mark_of`, with
-            ``exact`` False for what is not marked; and notes, see :func:`write_motion`.
+            What is to be said of the file in the summary: what marks it, which is to be written
+            beside it for CSV, see :func:`mark_of`, with ``exact`` False for what is not marked; and
+            its ``verdict_written`` and ``codes_written``, once it has been read again. And notes,
+            see :func:`write_motion`.
 
         Raises:
             DynacomError: as :func:`write_motion`.
         """
         if not self.changed:
             _copy(self.clip.path, Path(path))
-            return mark_of(path) | {"exact": self.clip.exact}, []
+            return mark_of(path) | {"exact": self.clip.exact} | _written(self.after), []
         after = self.repair.after
         forces = {
             contact.name: contact.wrench[:, : 3 if is_point(self.robot, contact.name) else 6]
@@ -92,7 +101,30 @@ class RepairReport:
             forces=forces,
             stretch=self.repair.stretch,
         )
-        return mark_of(path), notes
+        written = self._read_again(Path(path))
+        if written.verdict.outcome != self.after.verdict.outcome:
+            notes.append(
+                f"The motion is {written.verdict.outcome} "
+                f"({', '.join(written.verdict.codes)}) as it was written: its file cannot hold all "
+                "that was changed."
+            )
+        return mark_of(path) | _written(written), notes
+
+    def _read_again(self, path: Path) -> MotionReport:
+        """What is found of the motion as it was written."""
+        how = self.clip.options
+        read = read_motion(
+            path,
+            self.robot,
+            fps=None if how.fps is None else how.fps / self.repair.stretch,
+            quat=how.quat,
+            trust=how.trust,
+            clip=how.clip,
+        )
+        options = copy.deepcopy(self.options)
+        options.cutoff = None
+        examiner = make_examiner(self.robot, options, sensitivity=False)
+        return examine(read, self.robot, options, examiner, self.repair.recorded.schedule)
 
     def save(
         self,
@@ -231,6 +263,11 @@ def repair_clip(
         )
         after = MotionReport(repaired, robot, options, found.after, schedule_text)
     return RepairReport(clip, robot, options, found, before, after)
+
+
+def _written(report: MotionReport) -> dict[str, Any]:
+    verdict = report.verdict
+    return {"verdict_written": verdict.outcome, "codes_written": verdict.codes}
 
 
 def _copy(source: Path, path: Path) -> None:

@@ -150,7 +150,9 @@ def test_the_summary(hurried):
     # Before it is written nobody knows the file; all else is the same.
     unwritten = report.summary["repair"]
     assert {key: value for key, value in repair.items() if key in unwritten} == unwritten
-    assert set(repair) - set(unwritten) == {"file", "sha256", "exact"}
+    written = {"verdict_written", "codes_written"}
+    assert set(repair) - set(unwritten) == {"file", "sha256", "exact"} | written
+    assert (repair["verdict_written"], repair["codes_written"]) == ("feasible", ["feasible"])
 
 
 def test_contacts_for_training(talos, hurried):
@@ -464,6 +466,37 @@ def test_forces_in_the_file_are_those_of_the_new_motion(talos, tmp_path):
     assert [*again.summary["measured"]] == ["left_sole", "right_sole"]
     for name, compared in again.summary["measured"].items():
         assert_allclose(compared["rms"], 0.0, atol=1e-6, err_msg=name)
+
+
+def test_what_the_file_cannot_hold_is_told(talos, tmp_path):
+    """A file without the legs, which repair has to move, keeps feet that slide without them."""
+    path = tmp_path / "walk.csv"
+    with np.load(WALKS / "talos_walk.npz") as file:
+        still = np.tile(file["q"][0], (100, 1))
+    # The trunk turns faster than soles allow; the legs are at their default.
+    robot = replace(talos, default=still[0])
+    columns = {
+        name: values
+        for name, values in columns_of(talos, still).items()
+        if not name.startswith("leg_")
+    }
+    columns["torso_1_joint"] = 0.6 * np.sin(2.0 * np.pi * 1.5 * np.arange(100) / 50.0)
+    columns["arm_left_2_joint"] = 0.8 + 0.5 * np.sin(2.0 * np.pi * 2.5 * np.arange(100) / 50.0)
+    table = np.column_stack([*columns.values()])
+    np.savetxt(path, table, "%.9f", ",", header=",".join(columns), comments="")
+    report = dynacom.repair(path, robot, fps=50.0)
+    assert report.outcome == "repaired"
+    report.save(tmp_path / "out", page=False)
+    summary = json.loads((tmp_path / "out/summary.json").read_text())
+    again = dynacom.analyze(tmp_path / "out/walk.csv", robot, fps=50.0)
+    assert again.verdict.outcome == "repairable"
+    assert summary["repair"]["verdict"] == "feasible"
+    assert summary["repair"]["verdict_written"] == again.verdict.outcome
+    assert summary["repair"]["codes_written"] == again.verdict.codes
+    assert summary["notes"][-1] == (
+        f"The motion is repairable ({', '.join(again.verdict.codes)}) as it was written: its file "
+        "cannot hold all that was changed."
+    )
 
 
 def test_who_says_when_contacts_carry(talos, tmp_path):
