@@ -124,7 +124,8 @@ class RepairReport:
         options = copy.deepcopy(self.options)
         options.cutoff = None
         examiner = make_examiner(self.robot, options, sensitivity=False)
-        return examine(read, self.robot, options, examiner, self.repair.recorded.schedule)
+        marked = replace(read, exact=True)  # CSV is so when the summary is there
+        return examine(marked, self.robot, options, examiner, self.repair.recorded.schedule)
 
     def save(
         self,
