@@ -3,15 +3,15 @@
 
 The classes and functions are those of the C++ library, under the same names and with the same
 keyword arguments; arrays are copied on their way in and out. Robots and motions are read from files
-by :func:`load_robot` and :func:`read_motion`; :func:`analyze` judges a motion as a whole, and
-:func:`batch` many.
+by :func:`load_robot` and :func:`read_motion`; :func:`analyze` judges a motion as a whole,
+:func:`batch` many, and :func:`repair` makes one that physics allows.
 """
 
 # First: it registers the types of Pinocchio and eigenpy that the bindings take and return.
 import pinocchio  # noqa: F401  isort: skip
 
 from dynacom import compat as _compat
-from dynacom.analysis_options import AnalysisOptions
+from dynacom.analysis_options import AnalysisOptions, LadderSettings
 from dynacom.batch import BatchProgress, batch
 from dynacom.dynacom_pywrap import (
     BodyPoints,
@@ -123,6 +123,7 @@ from dynacom.motion_file import Clip, read_motion
 from dynacom.motion_mark import mark_of
 from dynacom.motion_report import MotionReport, analyze
 from dynacom.motion_writer import write_motion
+from dynacom.repair import RepairReport, make_repairer, repair
 from dynacom.robots import Payload, Robot, load_robot, make_robot, parse_payload
 from dynacom.schedule_file import read_schedule, write_schedule
 
@@ -161,6 +162,7 @@ __all__ = [
     "DynacomError",
     "FaultLimit",
     "HeldContact",
+    "LadderSettings",
     "MeasuredDifference",
     "MissingSupport",
     "Motion",
@@ -183,6 +185,7 @@ __all__ = [
     "RepairChange",
     "RepairGround",
     "RepairReason",
+    "RepairReport",
     "RepairSettings",
     "RepairStep",
     "Robot",
@@ -238,6 +241,7 @@ __all__ = [
     "kUnsureTorque",
     "kVelocityMismatch",
     "load_robot",
+    "make_repairer",
     "make_robot",
     "mark_of",
     "parse_payload",
@@ -245,6 +249,7 @@ __all__ = [
     "read_motion",
     "read_schedule",
     "rederiveMotion",
+    "repair",
     "repairMotion",
     "splitContacts",
     "summarizeMotion",

@@ -15,11 +15,16 @@ A settings file is YAML; what it does not name stays at its default::
     verdict:              # VerdictSettings: a limit, and the part of the frames that may exceed it
       residual_force: {limit: 0.1, allowed_share: 0.05}
       minimal_window: 1.0
+    repair:               # RepairSettings, field by field: what changes cost, and what is mended
+      displacement: 0.01  # [m]
+      feet: true
+    ladder:               # LadderSettings, field by field: how far repair goes
+      largest_displacement: 0.1 # [m]
 """
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -29,6 +34,7 @@ from dynacom.dynacom_pywrap import (
     CentroidalFilterSettings,
     DetectionSettings,
     FaultLimit,
+    RepairSettings,
     VerdictSettings,
     kAutomaticCutoff,
 )
@@ -39,11 +45,53 @@ from dynacom.yaml_file import is_number, parse_yaml, read_yaml
 
 #: What a cut-off is called that suits the motion.
 AUTO = "auto"
+# What is not good after so many rounds never is.
+_MOST_ROUNDS = 1000
+
+
+@dataclass(slots=True)
+class LadderSettings:
+    """How far repair goes, see ``MotionRepairer``.
+
+    Attributes:
+        rounds: how often a motion is repaired at most on each rung, with the contacts that are
+            found in what came out.
+        largest_displacement, largest_turn: a motion whose root has to be displaced farther than
+            this in any frame [m], or a joint turned by more [rad], is not said to be repaired.
+        largest_stretch: by which factor time may be stretched where nothing else helps; 1 for not
+            at all.
+        strict: whether single frames are mended, too, of motions that are feasible as a whole.
+    """
+
+    rounds: int = 3
+    largest_displacement: float = 0.1
+    largest_turn: float = 0.8
+    largest_stretch: float = 1.0
+    strict: bool = False
+
+    def validate(self) -> None:
+        """Raises ValueError, naming the first setting out of its range."""
+        if not 1 <= self.rounds <= _MOST_ROUNDS:
+            raise ValueError(
+                f"LadderSettings.rounds must be from 1 to {_MOST_ROUNDS}, got {self.rounds}"
+            )
+        for name in ("largest_displacement", "largest_turn"):
+            if not (math.isfinite(value := getattr(self, name)) and value > 0.0):
+                raise ValueError(f"LadderSettings.{name} must be finite and > 0, got {value:g}")
+        if not (math.isfinite(self.largest_stretch) and self.largest_stretch >= 1.0):
+            raise ValueError(
+                "LadderSettings.largest_stretch must be finite and >= 1, got "
+                f"{self.largest_stretch:g}"
+            )
+
+    def copy(self) -> "LadderSettings":
+        """Another one with the same values."""
+        return replace(self)
 
 
 @dataclass(slots=True)
 class AnalysisOptions:
-    """How a motion is analysed.
+    """How a motion is analysed, and repaired.
 
     Attributes:
         cutoff: of the filter where velocities and accelerations are computed [Hz]; 0 or None for no
@@ -57,6 +105,8 @@ class AnalysisOptions:
         filter: how that is found, see ``distanceToFeasible``.
         detection: how contacts are found, see ``inferContacts``.
         verdict: limits of the verdict, see ``judgeMotion``.
+        repair: what changes cost, and what is mended, see ``repairMotion``.
+        ladder: how far repair goes.
     """
 
     cutoff: float | Literal["auto"] | None = AUTO
@@ -67,6 +117,8 @@ class AnalysisOptions:
     filter: CentroidalFilterSettings = field(default_factory=CentroidalFilterSettings)
     detection: DetectionSettings = field(default_factory=DetectionSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
+    repair: RepairSettings = field(default_factory=RepairSettings)
+    ladder: LadderSettings = field(default_factory=LadderSettings)
 
     def validate(self) -> None:
         """Raises ValueError, naming the first setting out of its range."""
@@ -78,9 +130,8 @@ class AnalysisOptions:
             raise ValueError(f"cutoff must be finite and >= 0 Hz, {AUTO} or none, got {cutoff:g}")
         if not (math.isfinite(self.omega) and self.omega >= 0.0):
             raise ValueError(f"omega must be finite and >= 0 rad/s, got {self.omega:g}")
-        self.filter.validate()
-        self.detection.validate()
-        self.verdict.validate()
+        for group in _GROUP_NAMES:
+            getattr(self, group).validate()
 
     def update(self, values: Any, where: str) -> None:
         """Changes some of the settings; all of them or, where it raises, none.
@@ -136,12 +187,7 @@ class AnalysisOptions:
 
     def _update(self, changes: list[tuple[Any, str]], where: str) -> None:
         # What is in range depends on other settings: it is looked at when all have been changed.
-        changed = replace(
-            self,
-            filter=self.filter.copy(),
-            detection=self.detection.copy(),
-            verdict=self.verdict.copy(),
-        )
+        changed = replace(self, **{name: getattr(self, name).copy() for name in _GROUP_NAMES})
         for values, place in changes:
             _update(changed, values, place)
         try:
@@ -167,12 +213,16 @@ _GROUPS = (
     DetectionSettings,
     VerdictSettings,
     FaultLimit,
+    RepairSettings,
+    LadderSettings,
 )
+# Fields of AnalysisOptions that have settings of their own.
+_GROUP_NAMES = ("filter", "detection", "verdict", "repair", "ladder")
 
 
 def _names(group: Any) -> list[str]:
-    if isinstance(group, AnalysisOptions):
-        return list(AnalysisOptions.__dataclass_fields__)
+    if is_dataclass(group):
+        return [field.name for field in fields(group)]
     properties = vars(type(group)).items()
     return [name for name, value in properties if isinstance(value, property)]
 
@@ -220,6 +270,10 @@ def _update(group: Any, values: Any, where: str) -> None:
                     f"{where}: {name} must be a list of 3 finite numbers or null, got {value!r}"
                 )
             setattr(group, name, np.array(value, dtype=float))
+        elif isinstance(now, int):
+            if not (is_number(value) and value == int(value)):
+                raise DynacomError(f"{where}: {name} must be a whole number, got {value!r}")
+            setattr(group, name, int(value))
         elif is_number(value):
             setattr(group, name, float(value))
         elif value == AUTO and name in _AUTO:
