@@ -70,9 +70,11 @@ void exposeMotionRepairer() {
 
   bp::class_<RepairStep>("RepairStep", "What a rung of MotionRepairer's ladder has gained.",
                          bp::no_init)
-      .add_property("rung", &getRung, "'filter', 'schedule', 'balance', 'feet', 'joints' or 'time'")
+      .add_property("rung", &getRung,
+                    "'ground', 'filter', 'schedule', 'balance', 'feet', 'joints' or 'time'")
       .def_readonly("before", &RepairStep::before,
-                    "For the filter, the root's displacement by it [m]; for the schedule, the\n"
+                    "For the ground, the height of what is stood on above it [m]; for the filter,\n"
+                    "the root's displacement by it [m]; for the schedule, the\n"
                     "distance to a feasible motion [m]; for balance, frames whose wrench is not\n"
                     "within reach; for feet, the largest speed of a contact along the ground\n"
                     "[m/s]; for joints, how far one is beyond its limits [rad]; for time, the\n"
@@ -111,6 +113,8 @@ void exposeMotionRepairer() {
                     "than 0.001 m g or m g m")
       .def_readonly("missing", &MotionRepair::missing, "In how many they cannot now")
       .add_property("stances", &getStances, "A RepairedStance for each, of the last rung")
+      .def_readonly("ground_offset", &MotionRepair::ground_offset,
+                    "By how much all of it was lifted, besides these changes [m]")
       .def_readonly("stretch", &MotionRepair::stretch, "By which factor time was stretched")
       .add_property("steps", &getSteps, "A RepairStep for each rung")
       .add_property("reasons", &getReasons, "A RepairReason for all that is left")

@@ -127,6 +127,24 @@ BOOST_AUTO_TEST_CASE(time_is_stretched_where_that_is_allowed) {
   BOOST_TEST(std::abs(slow.recorded.time[299] - slow.stretch * recorded.time[299]) < 1e-9);
 }
 
+BOOST_AUTO_TEST_CASE(who_floats_above_a_ground_that_is_told_is_put_on_it) {
+  const Swayer walker;
+  Motion motion = walker.sway(300, 0.09);
+  motion.q.row(2).array() += 0.05;
+  RepairerSettings settings;
+  settings.examination.detection.ground_height = 0.;
+  const MotionRepair repair = repairRecordedMotion(*walker.robot, record(motion), settings);
+  BOOST_TEST((repair.outcome == RepairOutcome::Repaired));
+  BOOST_TEST((repair.steps.front().rung == RepairRung::Ground));
+  BOOST_TEST(std::abs(repair.ground_offset + 0.05) < 2e-3);
+  BOOST_TEST(repair.root.largest < 0.09);
+  // Whose ground is to be found stands where it is.
+  settings.examination.detection.ground_height = std::numeric_limits<double>::quiet_NaN();
+  const MotionRepair free = repairRecordedMotion(*walker.robot, record(motion), settings);
+  BOOST_TEST((free.outcome == RepairOutcome::Repaired));
+  BOOST_TEST(free.ground_offset == 0.);
+}
+
 BOOST_AUTO_TEST_CASE(settings_out_of_range_are_named) {
   RepairerSettings settings;
   settings.rounds = 0;

@@ -45,6 +45,7 @@ DYNACOM_EXPORT const char* to_string(RepairOutcome outcome);
 
 /// A rung of the ladder, in their order.
 enum class RepairRung {
+  Ground,    ///< all of it lifted to the height that the ground is told to have
   Filter,    ///< what was recorded is noisy, and was filtered
   Schedule,  ///< contacts, as they are in a motion that is exact
   Balance,   ///< wrenches within reach
@@ -53,10 +54,11 @@ enum class RepairRung {
   Time,      ///< stretched
 };
 
-/// "filter", "schedule", "balance", "feet", "joints" or "time".
+/// "ground", "filter", "schedule", "balance", "feet", "joints" or "time".
 DYNACOM_EXPORT const char* to_string(RepairRung rung);
 
-/// What a rung has gained. What is measured is for Filter and Schedule the distance to a feasible
+/// What a rung has gained. What is measured is for Ground the height of what is stood on above the
+/// ground [m]; for Filter and Schedule the distance to a feasible
 /// motion, root mean square [m], where it is known, else NaN; for Balance the number of frames
 /// whose wrench is not within reach; for Feet the largest speed of a contact along the ground
 /// [m/s]; for Joints how far one is beyond its range at most [rad]; for Time the factor.

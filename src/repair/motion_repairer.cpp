@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <utility>
 
@@ -41,7 +42,8 @@ const char* to_string(RepairOutcome outcome) {
 }
 
 const char* to_string(RepairRung rung) {
-  constexpr const char* kNames[] = {"filter", "schedule", "balance", "feet", "joints", "time"};
+  constexpr const char* kNames[] = {"ground", "filter", "schedule", "balance",
+                                    "feet",   "joints", "time"};
   return kNames[static_cast<std::size_t>(rung)];
 }
 
@@ -109,7 +111,12 @@ struct MotionRepairer::Workspace {
         settings(given_settings),
         recorded(robot, settings.examination),
         plain(robot, makePlain(settings.examination, settings.examination.cutoff)),
-        exact(robot, makePlain(settings.examination, 0.)) {}
+        exact(robot, makePlain(settings.examination, 0.)) {
+    if (std::isnan(settings.examination.detection.ground_height)) return;
+    ExaminationSettings found = plain.getSettings();
+    found.detection.ground_height = internal::kNaN;
+    anywhere.emplace(robot, found);
+  }
 
   static ExaminationSettings makePlain(ExaminationSettings settings, double cutoff) {
     settings.cutoff = cutoff;
@@ -122,6 +129,7 @@ struct MotionRepairer::Workspace {
   const DynaCoM robot;
   const RepairerSettings settings;
   const MotionExaminer recorded, plain, exact;
+  std::optional<MotionExaminer> anywhere;  // the ground, if it is told where it is
 
   class Ladder;
 };
@@ -376,26 +384,35 @@ MotionRepair MotionRepairer::repair(const RecordedMotion& recorded) const {
   const Workspace& workspace = *workspace_;
   MotionExamination before = workspace.recorded.examine(recorded);
   MotionRepair found = Workspace::Ladder(workspace, recorded, before).climb();
-  const double largest = workspace.settings.largest_stretch;
+  if (before.verdict.outcome == MotionOutcome::Unknown) return found;
+  // Another rung before all others, if that leads farther.
+  const auto tryOther = [&](const RecordedMotion& other, RepairStep step) {
+    MotionRepair climbed =
+        Workspace::Ladder(workspace, other, workspace.plain.examine(other)).climb();
+    if (climbed.outcome == RepairOutcome::NotRepaired) return;
+    climbed.outcome = RepairOutcome::Repaired;
+    climbed.missing_before = found.missing_before;
+    climbed.before = std::move(found.before);
+    climbed.recorded.v.resize(0, 0);
+    climbed.recorded.a.resize(0, 0);
+    climbed.steps.insert(climbed.steps.begin(), step);
+    found = std::move(climbed);
+  };
+  RecordedMotion other = {recorded.time, recorded.q, {}, {}, recorded.schedule, recorded.is_exact};
+  if (found.outcome == RepairOutcome::NotRepaired && workspace.anywhere) {
+    const double level = workspace.anywhere->examine(recorded).terrain.level;
+    const double ground = workspace.settings.examination.detection.ground_height;
+    RecordedMotion lifted = other;
+    lifted.q.row(2).array() += ground - level;
+    tryOther(lifted, {RepairRung::Ground, level - ground, 0., true});
+    if (found.outcome != RepairOutcome::NotRepaired) found.ground_offset = ground - level;
+  }
   for (const double factor : kStretches) {
-    if (found.outcome != RepairOutcome::NotRepaired || factor > largest ||
-        before.verdict.outcome == MotionOutcome::Unknown)
+    if (found.outcome != RepairOutcome::NotRepaired || factor > workspace.settings.largest_stretch)
       break;
-    RecordedMotion slower = {recorded.time,     recorded.q,       {}, {},
-                             recorded.schedule, recorded.is_exact};
-    slower.time = recorded.time[0] + factor * (recorded.time.array() - recorded.time[0]);
-    MotionRepair other =
-        Workspace::Ladder(workspace, slower, workspace.plain.examine(slower)).climb();
-    const bool is_kept = other.outcome != RepairOutcome::NotRepaired;
-    if (!is_kept) continue;
-    other.before = std::move(before);
-    other.missing_before = found.missing_before;
-    other.stretch = factor;
-    other.outcome = RepairOutcome::Repaired;
-    other.recorded.v.resize(0, 0);
-    other.recorded.a.resize(0, 0);
-    other.steps.insert(other.steps.begin(), {RepairRung::Time, 1., factor, true});
-    return other;
+    other.time = recorded.time[0] + factor * (recorded.time.array() - recorded.time[0]);
+    tryOther(other, {RepairRung::Time, 1., factor, true});
+    if (found.outcome != RepairOutcome::NotRepaired) found.stretch = factor;
   }
   return found;
 }
