@@ -161,7 +161,7 @@ BOOST_AUTO_TEST_CASE(feet_come_down_to_their_ground_and_up_from_below_it) {
   schedule.active.middleCols(first, behind - first).bottomRows(4).setConstant(false);
   for (Index k = first; k < behind; ++k) {
     const double part = double(k - first + 1) / double(behind - first + 1);
-    motion.q(12, k) -= 0.006 * std::sin(M_PI * part);
+    motion.q(12, k) -= 0.006 * std::pow(std::sin(M_PI * part), 2);
   }
   RepairGround ground;
   ground.height.setZero(8, 100);

@@ -99,6 +99,7 @@ struct MotionRepair {
   /// m g m.
   Eigen::Index missing_before = 0, missing = 0;
   std::vector<RepairedStance> stances;  ///< of the last rung
+  double ground_offset = 0.;            ///< by which all was lifted, besides these changes [m]
   double stretch = 1.;                  ///< of time
   std::vector<RepairStep> steps;
   /// Of `Repaired` and `Feasible` none. Codes are those of faults, and `contact_needed` where

@@ -129,7 +129,12 @@ def _rung(step: RepairStep, before: MotionExamination) -> dict[str, Any]:
 
 def _rung_texts(step: RepairStep, before: MotionExamination) -> Iterator[str]:
     """What a step did, and what it gained."""
-    if step.rung == "filter":
+    if step.rung == "ground":
+        yield (
+            f"All of it was lifted by {-1e3 * step.before:.0f} mm, to the height that the ground is "
+            "told to have."
+        )
+    elif step.rung == "filter":
         yield (
             f"The motion was filtered at {before.derived.cutoff:g} Hz, which moved the root by "
             f"{1e3 * step.after:.2g} mm (RMS)."

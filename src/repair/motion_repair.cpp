@@ -202,7 +202,7 @@ class Footwork {
   // Parts in the air keep above the ground under them, and those of a contact none of whose parts
   // carries as far as it can get from one stance to the next.
   void clear() {
-    constexpr double kAcceleration = 20.;  // [m/s²]
+    constexpr double kAcceleration = 10.;  // [m/s²]
     const Index frames = problem_.time.size();
     problem_.floor = ground_.height;
     for (Index first = 0, behind = 0; first < problem_.floor.rows(); first = behind) {

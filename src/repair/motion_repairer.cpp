@@ -155,7 +155,8 @@ class MotionRepairer::Workspace::Ladder {
     }
     const std::optional<MotionExamination> contacts = findContacts();
     Attempt best = balance(contacts ? *contacts : found_.before);
-    if (settings_.repair.feet || settings_.repair.joints) standAndLimit(best);
+    if (settings_.repair.feet || settings_.repair.joints)
+      standAndLimit(contacts ? *contacts : found_.before, best);
     finish(std::move(best));
     return std::move(found_);
   }
@@ -211,13 +212,16 @@ class MotionRepairer::Workspace::Ladder {
     return attempt;
   }
 
-  // Feet and joints, if something is wrong with them, and no wrench is lost for it.
-  void standAndLimit(Attempt& best) {
+  // Feet and joints, if something is wrong with them, and no wrench is lost for it. Where balance
+  // alone has not led to where contacts are found again, feet that are level may.
+  void standAndLimit(const MotionExamination& contacts, Attempt& best) {
     const double limits = findExcess(best.repaired.motion.q);
     const bool are_limits_wrong = settings_.repair.joints && limits > kWithinLimits;
     const bool are_feet_wrong = settings_.repair.feet && !best.found.verdict.isFeasible();
     if (!are_limits_wrong && !are_feet_wrong) return;
-    Attempt attempt = repeat(settings_.repair, best.found, best.repaired.motion.q);
+    const bool is_balanced = best.missing == 0;
+    Attempt attempt = repeat(settings_.repair, is_balanced ? best.found : contacts,
+                             is_balanced ? best.repaired.motion.q : found_.before.derived.motion.q);
     const bool is_kept = attempt.missing <= best.missing && isSmall(attempt.repaired.change) &&
                          rank(attempt.found.verdict.outcome) >= rank(best.found.verdict.outcome);
     if (settings_.repair.feet)
