@@ -427,7 +427,8 @@ class Footwork {
 };
 
 // What contacts cannot give, over the weight, and how far what carries is from its place.
-double measure(const WholeBodyProblem& problem, const Eigen::MatrixXd& q, RepairedMotion& found) {
+double measure(const WholeBodyProblem& problem, const Eigen::MatrixXd& ground,
+               const Eigen::MatrixXd& q, RepairedMotion& found) {
   internal::MotionLinearizer linearizer(problem.model, problem.points);
   internal::ConeProjection projection(1., internal::ConeProjection::kExact);
   internal::LinearizedFrame needed;
@@ -439,12 +440,11 @@ double measure(const WholeBodyProblem& problem, const Eigen::MatrixXd& q, Repair
     linearizer.evaluate(problem.time, q, frame, needed);
     for (std::size_t part = 0; part < problem.points.size(); ++part) {
       const auto place = needed.points.col(Index(part));
-      if (problem.held[static_cast<std::size_t>(frame)] >> part & 1u)
+      if (set >> part & 1u)
         found.held_largest =
             std::max(found.held_largest, (place - problem.targets[part].col(frame)).norm());
-      else if (problem.floor.rows() > 0)  // std::max() leaves what is not known
-        found.sunk_largest =
-            std::max(found.sunk_largest, problem.floor(Index(part), frame) - place.z());
+      else if (ground.rows() > 0)  // std::max() leaves what is not known
+        found.sunk_largest = std::max(found.sunk_largest, ground(Index(part), frame) - place.z());
     }
     if (problem.free[frame]) continue;
     if (!needed.wrench.allFinite())
@@ -571,7 +571,7 @@ RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
   found.change.setZero(model.nv, frames);
   found.stances = Footwork(split, problem, settings, ground).find();
   Eigen::MatrixXd q = motion.q;
-  double worst = measure(problem, q, found);
+  double worst = measure(problem, settings.feet ? ground.height : Eigen::MatrixXd(), q, found);
   measureJoints(problem, q, found);
   const bool are_joints_wrong =
       settings.joints && std::max(found.joint_excess, found.speed_excess) > 0.;
@@ -580,7 +580,7 @@ RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
     const bool is_new = start.size() == 0;
     repairInWindows(problem, settings, is_new ? motion.q : start, !is_new && !settings.anew,
                     found.change, q);
-    worst = measure(problem, q, found);
+    worst = measure(problem, settings.feet ? ground.height : Eigen::MatrixXd(), q, found);
     measureJoints(problem, q, found);
   } else {
     for (RepairedStance& stance : found.stances) stance.is_still = false;
