@@ -131,8 +131,8 @@ def _rung_texts(step: RepairStep, before: MotionExamination) -> Iterator[str]:
     """What a step did, and what it gained."""
     if step.rung == "ground":
         yield (
-            f"All of it was lifted by {-1e3 * step.before:.0f} mm, to the height that the ground is "
-            "told to have."
+            f"All of it was lifted by {-1e3 * step.before:.0f} mm, to the height that the ground "
+            "is told to have."
         )
     elif step.rung == "filter":
         yield (
