@@ -1,19 +1,14 @@
-"""What repairMotion makes of motions of other people: the tables of docs/repair.md, in Markdown.
+"""What repair makes of motions of other people: the tables of docs/repair.md, in Markdown.
 
-A clip is examined as ever, its filtered configurations are repaired with the contacts that were
-found, and what comes out is examined once more, without a filter, as if it were a file. Where its
-contacts cannot give what every frame needs, it is repaired once more with the contacts that were
-found then, up to ROUNDS times.
-
-Motions whose forces were measured are repaired once, and analysed with the same contacts; nothing
-is asked of frames that are unsure.
+Clips are repaired by dynacom.repair, once with wrenches only, and once with feet and joints.
+Motions whose forces were measured are repaired by repairMotion, wrenches only, with the contacts
+that were found in them, and analysed with the same; nothing is asked of frames that are unsure.
 """
 
 import argparse
 import sys
 import time
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,16 +20,6 @@ import truth_trials
 import dynacom
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
-ROUNDS = 3
-DONE = {"Solved", "NoContact"}
-
-
-def settings_for(feet):
-    """Of feet that are "held" where they drift by little, or move as they did."""
-    settings = dynacom.RepairSettings()
-    if feet == "moved":
-        settings.largest_drift = 0.0
-    return settings
 
 
 def rms(values):
@@ -74,69 +59,36 @@ def joints(model, steps):
 # ---- Clips ----
 
 
-def solved(found):
-    """Which part of the frames contacts can give, or are in flight and need nothing [%]."""
-    weight = found.statistics.weight
-    residual = np.linalg.norm(found.analysis.residual, axis=1) / weight
-    names = [status.name for status in found.analysis.status]
-    good = [name in DONE and size < 1e-3 for name, size in zip(names, residual, strict=True)]
-    return 100.0 * np.mean(good)
+def share(missing, found):
+    """Which part of the frames is within reach [%]."""
+    return 100.0 * (1.0 - missing / found.statistics.frames)
 
 
-def examine(clip, robot, **options):
-    return dynacom.analyze(
-        clip, robot, options=dynacom.AnalysisOptions(**options), sensitivity=False
-    ).examination
+def span(change, factor, digits):
+    """RMS and largest."""
+    return f"{factor * change.rms:.{digits}f} / {factor * change.largest:.0f}"
 
 
-@dataclass
-class Outcome:
+def slide(found):
+    """In which part of the frames a contact slides faster than a verdict allows [%]."""
+    finding = found.verdict.findings["foot_sliding"]
+    return 100.0 * finding.frames / found.statistics.frames
+
+
+def cells(report):
     """Of a clip's repair."""
-
-    before: dynacom.MotionExamination
-    again: dynacom.MotionExamination  # of the filtered motion, without repair
-    after: dynacom.MotionExamination
-    within_reach: bool  # of the contacts that it was repaired with last
-    rounds: int
-    seconds: float  # of CPU, for all of them
-
-    def cells(self, model):
-        steps = change(model, self.before.derived.motion.q, self.after.derived.motion.q)
-        verdict = self.after.verdict
-        return [
-            f"{solved(self.before):.0f}",
-            f"{solved(self.again):.0f}",
-            f"{solved(self.after):.1f}",
-            str(self.rounds),
-            length(steps[:, :3]),
-            joints(model, steps),
-            verdict.outcome,
-            ", ".join(code for code in verdict.codes if code != "feasible"),
-        ]
-
-
-def reexamine(clip, robot, motion):
-    """As if a file held these configurations, which need no filter."""
-    written = repair_derived.with_configurations(clip, np.asarray(motion.q))
-    return examine(written, robot, cutoff=0.0)
-
-
-def repair(clip, robot, settings):
-    found = before = examine(clip, robot)
-    motion = found.derived.motion
-    again = reexamine(clip, robot, motion)
-    seconds, rounds = 0.0, 0
-    for _ in range(ROUNDS):
-        rounds += 1
-        start = time.process_time()
-        parts = dynacom.splitContacts(robot.dynacom(), found.links)
-        repaired = dynacom.repairMotion(parts, motion, found.inference.schedule, settings)
-        seconds += time.process_time() - start
-        motion = repaired.motion
-        found = reexamine(clip, robot, motion)
-        if solved(found) == 100.0:
-            break
-    return Outcome(before, again, found, repaired.within_reach, rounds, seconds)
+    made = report.repair
+    before, after = made.before, made.after
+    return [
+        f"{share(made.missing_before, before):.0f}",
+        f"{share(made.missing, after):.1f}",
+        f"{slide(before):.1f}",
+        f"{slide(after):.1f}",
+        span(made.root, 1e3, 1),
+        span(made.joints, np.degrees(1.0), 2),
+        after.verdict.outcome,
+        ", ".join(sorted({reason.code for reason in made.reasons})),
+    ]
 
 
 def read_samples(data, names):
@@ -154,49 +106,53 @@ def read_samples(data, names):
 
 
 REPAIRED = [
-    "before [%]",
-    "again [%]",
+    "reach before [%]",
     "after [%]",
-    "rounds",
+    "slides before [%]",
+    "after [%]",
     "root [mm]",
     "joints [°]",
-    "verdict",
-    "codes",
+    "after",
+    "what is left",
 ]
 
 
+def repair_clip(clip, robot, balance_only):
+    start = time.process_time()
+    report = dynacom.repair(clip, robot, balance_only=balance_only, threads=1)
+    return report, 1e6 * (time.process_time() - start) / len(clip.time)
+
+
 def print_clips(data, names):
-    print_head(["clip", "feet", *REPAIRED, "µs a frame"])
+    print_head(["clip", "before", "mended", *REPAIRED, "µs a frame"])
     for name, robot, clip in read_samples(data, names):
-        for feet in ("moved", "held"):
-            outcome = repair(clip, robot, settings_for(feet))
-            share = 1e6 * outcome.seconds / outcome.rounds / len(clip.time)
-            print_row([name, feet, *outcome.cells(robot.model), f"{share:.0f}"])
+        for balance_only in (True, False):
+            report, spent = repair_clip(clip, robot, balance_only)
+            mended = "wrenches" if balance_only else "all"
+            before = report.repair.before.verdict.outcome
+            print_row([name, before, mended, *cells(report), f"{spent:.0f}"])
 
 
 # ---- Motions made from clips ----
 
 
 def print_derived(data, names):
-    print_head(["clip", "made", "verdict before", *REPAIRED])
-    motions, repairable, reached, solved_all = Counter(), Counter(), Counter(), Counter()
-    for name, robot, clip in read_samples(data, names):
+    counts = {made: Counter() for made in repair_derived.DERIVED}
+    for _, robot, clip in read_samples(data, names):
         for made, derive in repair_derived.DERIVED.items():
-            outcome = repair(derive(clip, robot.model), robot, settings_for("moved"))
-            verdict = outcome.before.verdict.outcome
-            print_row([name, made, verdict, *outcome.cells(robot.model)])
-            motions[made] += 1
-            if verdict == "repairable":
-                repairable[made] += 1
-                reached[made] += outcome.within_reach
-                solved_all[made] += solved(outcome.after) == 100.0
-    print()
-    within = "all frames within reach of "
-    head = [within + "the contacts before", within + "those found after"]
-    print_head(["made", "motions", "repairable", *head])
-    for made in repair_derived.DERIVED:
-        counts = (motions, repairable, reached, solved_all)
-        print_row([made, *(str(count[made]) for count in counts)])
+            derived = derive(clip, robot.model)
+            balanced = dynacom.repair(derived, robot, balance_only=True).repair
+            count = counts[made]
+            count["motions"] += 1
+            if balanced.before.verdict.outcome != "repairable":
+                continue
+            count["repairable"] += 1
+            count["within reach"] += balanced.missing == 0
+            count["repaired"] += dynacom.repair(derived, robot).outcome == "repaired"
+    columns = ["motions", "repairable", "within reach", "repaired"]
+    print_head(["made", *columns])
+    for made, count in counts.items():
+        print_row([made, *(str(count[column]) for column in columns)])
 
 
 # ---- Motions whose forces were measured ----
@@ -217,7 +173,9 @@ def balance(trial):
     unsure = np.asarray(found.verdict.unsure)
     parts = dynacom.splitContacts(trial.robot.dynacom(), found.links)
     schedule, motion = found.inference.schedule, found.derived.motion
-    repaired = dynacom.repairMotion(parts, motion, schedule, settings_for("moved"), unsure)
+    settings = dynacom.RepairSettings()
+    settings.feet = settings.joints = False
+    repaired = dynacom.repairMotion(parts, motion, schedule, settings, unsure)
     before, after = (
         dynacom.analyzeMotion(parts.robot, moved, schedule) for moved in (motion, repaired.motion)
     )
