@@ -8,7 +8,7 @@ import os
 import secrets
 import time
 import urllib.parse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,6 +18,13 @@ import numpy as np
 
 from dynacom.analysis_options import AnalysisOptions
 from dynacom.batch_files import local_copy, printable
+from dynacom.batch_repair import (
+    REPAIR_COLUMNS,
+    RepairedFile,
+    WritingError,
+    remove_repaired,
+    repair_row,
+)
 from dynacom.dynacom_pywrap import (
     CollisionPoints,
     Contact6DSettings,
@@ -28,7 +35,7 @@ from dynacom.dynacom_pywrap import (
 from dynacom.errors import DynacomError
 from dynacom.motion_clip import Options
 from dynacom.motion_file import Clip, read_motion
-from dynacom.motion_pickle import read_clips
+from dynacom.motion_pickle import PickleFile
 from dynacom.motion_report import (
     FAULTS,
     MotionReport,
@@ -37,6 +44,7 @@ from dynacom.motion_report import (
     window_times,
 )
 from dynacom.other_contacts import body_statistics, seat_statistics
+from dynacom.repair import RepairReport, make_repairer, repair_clip
 from dynacom.robots import Robot
 from dynacom.terrain import ground_heights
 
@@ -76,6 +84,7 @@ _COLUMNS = (
     ("no_contact_share", "double", ""),
     ("bodies", "bodies", ""),
     ("seats", "seats", ""),
+    *REPAIR_COLUMNS,
 )
 # Of the columns that hold a list of things: what is known of each.
 _THINGS = {
@@ -132,6 +141,8 @@ class Job:
     trust: bool = False
     #: Where the tables of frames go; None for nowhere.
     frames: Path | None = None
+    #: Where repaired motions go; None if nothing is repaired.
+    repair: Path | None = None
 
     def __reduce__(self) -> tuple:
         robot = self.robot
@@ -143,11 +154,14 @@ class Job:
         # Meshes are read once, and not by every process.
         points = None if self.options.feet_only else robot.collision_points
         options = self.options.to_dict()
-        return _make_job, (parts, points, options, self.fps, self.quat, self.trust, self.frames)
+        others = (self.fps, self.quat, self.trust, self.frames, self.repair)
+        return _make_job, (parts, points, options, *others)
 
     def settings(self) -> dict[str, Any]:
         """All that results depend on, but for the files: it can be written as JSON."""
-        robot = self.robot
+        robot, options = self.robot, self.options.to_dict()
+        if self.repair is None:
+            del options["repair"], options["ladder"]
         return {
             "dynacom": __version__,
             "robot": robot.name,
@@ -156,11 +170,12 @@ class Job:
             "joint_layouts": robot.joint_layouts,
             "contacts": {name: _jsonable(s) for name, s in robot.contacts.items()},
             "bodies": None if self.options.feet_only else _digest_bodies(robot),
-            "options": self.options.to_dict(),
+            "options": options,
             "fps": self.fps,
             "quat": self.quat,
             "trust": self.trust,
             "frames": self.frames is not None,
+            "repair": self.repair is not None,
         }
 
     def key(self) -> str:
@@ -238,32 +253,34 @@ def _digest_bodies(robot: Robot) -> str:
     return digest.hexdigest()
 
 
-class FramesError(DynacomError):
-    """A table of frames cannot be written: not the clip's fault, nor would the next do better."""
-
-
 class Judge:
-    """Analyses clips, one after the other, and has no memory of them."""
+    """Analyses clips, and repairs them, one after the other, and has no memory of them."""
 
     def __init__(self, job: Job) -> None:
         self._job = job
         self._reading = Options(job.fps, job.quat, job.trust)
         # One thread: there are other processes.
         self._examiner = make_examiner(job.robot, job.options, sensitivity=False, threads=1)
+        self._repairer = None
+        if job.repair is not None:
+            self._repairer = make_repairer(job.robot, job.options, threads=1)
 
-    def __call__(self, name: str, file: str, known: str | None) -> list[Row] | None:
+    def __call__(
+        self, name: str, file: str, known: str | None, place: str | None = None
+    ) -> list[Row] | None:
         """The rows of a file: one per clip in it, whatever it holds.
 
         Args:
             name: the file's in results.
             file: a path or a URL.
             known: the SHA-256 of a file of which the rows are known already.
+            place: where it lies among the repaired motions, a relative path.
 
         Returns:
             The rows, or None if that is this file.
 
         Raises:
-            FramesError: what was found cannot be written.
+            WritingError: what was found, or repaired, cannot be written.
         """
         start = time.perf_counter()
         path = Path(file)
@@ -275,13 +292,22 @@ class Judge:
                     digest = _digest(opened)
                 if digest == known:
                     return None
-                for clip, read in self._clips(path):
-                    found = self._judge(name, clip, path, read)
+                pickle = self._open(path)
+                repaired = None
+                if self._job.repair is not None:
+                    repaired = RepairedFile(self._job.repair, place, path, pickle)
+                for clip, read in self._clips(path, pickle):
+                    found = self._judge(name, clip, path, read, repaired)
                     rows.append(found | {"sha256": digest, "seconds": time.perf_counter() - start})
                     start = time.perf_counter()
-        except FramesError:
+                if repaired is not None:
+                    _write_repaired(repaired, rows, lambda e: _message(e, name, path))
+                    rows[-1]["seconds"] += time.perf_counter() - start
+        except WritingError:
             raise
         except Exception as error:  # whatever the file made any library raise
+            if self._job.repair is not None:
+                remove_repaired(self._job.repair, place)
             message = _message(error, name, path)
             rows.append(
                 error_row(self._job, name, message)
@@ -289,31 +315,104 @@ class Judge:
             )
         return rows
 
-    def _clips(self, path: Path) -> Iterator[tuple[str | None, Callable[[], Clip]]]:
-        """The clips of a file by name: None for one that is alone."""
-        robot, reading = self._job.robot, self._reading
-        if path.suffix.lower() in (".pkl", ".pickle", ".joblib") and path.is_file():
-            with np.errstate(all="ignore"):
-                yield from read_clips(path, robot, reading)
-        else:
-            yield None, lambda: read_motion(path, robot, **asdict(reading))
+    def _open(self, path: Path) -> PickleFile | None:
+        """The file, if it may hold several clips."""
+        if path.suffix.lower() not in (".pkl", ".pickle", ".joblib"):
+            return None
+        with np.errstate(all="ignore"):
+            return PickleFile(path, self._reading)
 
-    def _judge(self, name: str, clip: str | None, path: Path, read: Callable[[], Clip]) -> Row:
+    def _clips(
+        self, path: Path, pickle: PickleFile | None
+    ) -> Iterable[tuple[str | None, Callable[[], Clip]]]:
+        """The clips of a file by name: None for one that is alone."""
+        if pickle is not None:
+            return pickle.clips(self._job.robot)
+        return [(None, lambda: read_motion(path, self._job.robot, **asdict(self._reading)))]
+
+    def _judge(
+        self,
+        name: str,
+        clip: str | None,
+        path: Path,
+        read: Callable[[], Clip],
+        repaired: RepairedFile | None,
+    ) -> Row:
         job = self._job
-        clip = None if clip is None else printable(clip)
-        frames = None if job.frames is None else _frames_file(job.frames, job.robot, name, clip)
+        title = None if clip is None else printable(clip)
+        frames = None if job.frames is None else _frames_file(job.frames, job.robot, name, title)
         try:
             with np.errstate(all="ignore"):
-                report = examine(read(), job.robot, job.options, self._examiner)
+                report, made = self._examine(read())
             row = _report_row(report, name)
         except Exception as error:
             if frames is not None:
                 with suppress(OSError):
                     frames.unlink()  # of the file as it was before
-            return error_row(job, name, _message(error, name, path)) | {"clip": clip}
+            if repaired is not None:
+                repaired.add(clip, None)
+            return error_row(job, name, _message(error, name, path)) | {"clip": title}
         if frames is not None:
-            _write_frames(report, name, clip, frames, job.frames)
-        return row | {"clip": clip}
+            _write_frames(report, name, title, frames, job.frames)
+        if repaired is not None:
+            row |= _repair_columns(repaired, clip, made, lambda e: _message(e, name, path))
+        return row | {"clip": title}
+
+    def _examine(self, clip: Clip) -> tuple[MotionReport, RepairReport | Exception | None]:
+        """What is found of a clip, and, where that is asked for, its repair, or why there is none.
+
+        Raises:
+            DynacomError: as :func:`examine`.
+        """
+        job, error = self._job, None
+        if self._repairer is not None:
+            try:
+                made = repair_clip(clip, job.robot, job.options, self._repairer)
+                return made.before, made
+            except Exception as raised:  # analysis alone may well do
+                error = raised
+        return examine(clip, job.robot, job.options, self._examiner), error
+
+
+def _repair_columns(
+    repaired: RepairedFile,
+    clip: str | None,
+    made: RepairReport | Exception,
+    message: Callable[[Exception], str],
+) -> Row:
+    """Those of a clip's repair, which is added to its file.
+
+    Args:
+        message: what is said of an error.
+    """
+    if isinstance(made, Exception):
+        repaired.add(clip, None)
+        return {"repair_error": message(made)}
+    row = _without_nan(repair_row(made))
+    try:
+        if repaired.add(clip, made):
+            row["repair_file"] = repaired.name
+    except Exception as error:  # whatever its format makes any library raise
+        row["repair_error"] = message(error)
+    return row
+
+
+def _write_repaired(
+    repaired: RepairedFile, rows: list[Row], message: Callable[[Exception], str]
+) -> None:
+    """Writes a file; if that cannot be, its clips' rows tell why.
+
+    Raises:
+        WritingError: nothing can be written there.
+    """
+    try:
+        repaired.write()
+    except WritingError:
+        raise
+    except Exception as error:
+        for row in rows:
+            if row.pop("repair_file", None) is not None:
+                row["repair_error"] = message(error)
 
 
 def _digest(file: BinaryIO) -> str:
@@ -385,6 +484,11 @@ def _report_row(report: MotionReport, name: str) -> Row:
         for column, _, _ in _CONTACT_COLUMNS:
             value = grounds[contact.name] if column == "ground" else getattr(contact, column)
             row[f"contact.{contact.name}.{column}"] = value
+    return _without_nan(row)
+
+
+def _without_nan(row: Row) -> Row:
+    """The row, with null where a number does not exist, or is too large."""
     return {
         column: None if isinstance(value, float) and not math.isfinite(value) else value
         for column, value in row.items()
@@ -443,4 +547,4 @@ def _write_frames(
     except OSError as error:
         with suppress(OSError):
             temporary.unlink()
-        raise FramesError(f"{folder}: cannot be written ({error.strerror or error})") from error
+        raise WritingError(f"{folder}: cannot be written ({error.strerror or error})") from error
