@@ -70,6 +70,10 @@ class Arrays:
             raise DynacomError(f"{self._path}: {name} must be one number, got shape {array.shape}")
         return float(array.item())
 
+    def filled(self, name: str, value: float) -> np.ndarray:
+        """A number in the shape of an array that is there."""
+        return np.full(self._archive[name].shape, value)
+
     def texts(self, name: str, count: int | None = None) -> tuple[str, ...]:
         """Texts: so many, or any number."""
         array = self._take(name, "U", "texts")

@@ -43,6 +43,8 @@ class Change:
     forces: Mapping[str, np.ndarray]
     #: Whether the file is to be marked as exact.
     mark: bool
+    #: By which factor time is stretched.
+    stretch: float = 1.0
     #: What is to be said about what was written.
     notes: list[str] = field(default_factory=list)
 
@@ -54,6 +56,7 @@ class Change:
         schedule: ContactSchedule | None,
         forces: Mapping[str, np.ndarray] | None,
         mark: bool,
+        stretch: float = 1.0,
     ) -> "Change":
         """Of a clip.
 
@@ -63,6 +66,8 @@ class Change:
         Raises:
             DynacomError: something has another shape than it must have, or is not finite.
         """
+        if not (np.isfinite(stretch) and stretch > 0.0):
+            raise DynacomError(f"stretch must be finite and > 0, got {stretch:g}")
         frames = len(clip.time)
         q = np.asarray(q, dtype=float)
         if q.shape != clip.q.shape:
@@ -85,7 +90,7 @@ class Change:
                 raise DynacomError(f"forces of {name} must have shape {shape}, got {values.shape}")
             check_finite(clip.path, f"forces of {name}", values)
         rows = np.arange(frames) if clip.gaps is None else clip.gaps.places()
-        change = cls(clip, rows, clip.q[rows], q[rows], schedule, forces, mark)
+        change = cls(clip, rows, clip.q[rows], q[rows], schedule, forces, mark, stretch)
         change._note_held_joints()
         return change
 
@@ -96,14 +101,43 @@ class Change:
 
     @property
     def moves(self) -> bool:
-        """Whether anything that the file has moves."""
+        """Whether anything that the file has moves, or does so at another pace."""
+        if self.stretch != 1.0:
+            return True
         held = self._held_columns()
         return not np.array_equal(np.delete(self.q, held, 1), np.delete(self.before, held, 1))
 
     @property
     def rate(self) -> float:
-        """The highest frame rate [Hz]; 0 of a single frame."""
-        return 1.0 / np.diff(self.clip.time).min() if len(self.clip.time) > 1 else 0.0
+        """The highest frame rate after the change [Hz]; 0 of a single frame."""
+        time = self.stretched(self.clip.time)
+        return 1.0 / np.diff(time).min() if len(time) > 1 else 0.0
+
+    def stretched(self, time: np.ndarray) -> np.ndarray:
+        """Times, the first of which stays where it is."""
+        return time if self.stretch == 1.0 else time[0] + self.stretch * (time - time[0])
+
+    def frame_rate(self, old: float | None) -> float | None:
+        """What the file is to say of its frame rate [Hz]; notes what it cannot.
+
+        Args:
+            old: in the file; None where it has neither times nor a rate.
+        """
+        if self.stretch == 1.0:
+            return old
+        given = self.clip.options.fps
+        rate = (given or old) / self.stretch
+        if old is None:
+            self.notes.append(
+                f"Time is stretched, and the file has no place to say so: its frame rate is "
+                f"{rate:.9g} Hz now (--fps)."
+            )
+            return None
+        if given is not None:
+            self.notes.append(
+                f"The frame rate is {rate:.9g} Hz now, as the file says: --fps is not to be given."
+            )
+        return rate
 
     def position(self, old: np.ndarray) -> np.ndarray:
         """The root's, (F, 3).
@@ -157,9 +191,16 @@ class Change:
         gaps = self.clip.gaps
         return q if gaps is None else gaps.configurations(model or self.model, q)
 
-    def derivatives(self, q: np.ndarray, model: pin.Model | None = None) -> Motion:
-        """Velocities and accelerations of such configurations, in all frames of the clip."""
-        return differentiate(model or self.model, self.clip.time, q)
+    def derivatives(
+        self, q: np.ndarray, model: pin.Model | None = None, *, before: bool = False
+    ) -> Motion:
+        """Velocities and accelerations of such configurations, in all frames of the clip.
+
+        Args:
+            before: whether at the pace that the clip had.
+        """
+        time = self.clip.time if before else self.stretched(self.clip.time)
+        return differentiate(model or self.model, time, q)
 
     def mask(self, contact: str, unsure: bool) -> np.ndarray:
         """When a contact is active, (F,): 0 and 1.

@@ -105,6 +105,9 @@ def changed_columns(
     if change.moves:
         after |= zip(layout.root, pose.T, strict=True)
         after |= zip(names, change.angles(names, angles).T, strict=True)
+        after |= {name: change.stretched(columns[name]) for name in layout.times}
+        if not layout.times:
+            change.frame_rate(None)
     if change.schedule is not None and layout.masks:
         for contact, column in layout.masks.items():
             unsure = not np.isin(columns[column], (0.0, 1.0)).all()

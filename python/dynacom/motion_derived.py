@@ -113,7 +113,7 @@ def _joint_velocities(
         return None
     model = change.model
     columns = [model.joints[model.getJointId(name)].idx_v for name in joints.names]
-    before = change.derivatives(change.clip.q).v[change.rows][:, columns]
+    before = change.derivatives(change.clip.q, before=True).v[change.rows][:, columns]
     error = np.sqrt(np.mean((old.reshape(before.shape) - before) ** 2))
     if error > _SAME_VELOCITY * np.sqrt(np.mean(before**2)):
         return None

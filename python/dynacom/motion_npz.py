@@ -106,6 +106,9 @@ def _changed_plain(change: Change, arrays: Arrays) -> dict[str, np.ndarray | Non
         root = [change.position(old[:, :3]), change.quaternion(old[:, 3:7])]
         new = np.hstack([*root, change.q[:, 7:]])
         changes["q"] = q = arrays.cast("q", new, change.notes)
+        if change.stretch != 1.0:
+            time = change.stretched(arrays.numbers("t", frames))
+            changes["t"] = arrays.cast("t", time, change.notes)
         motion = change.derivatives(change.as_read(q.astype(float)))
         for name, values in (("v", motion.v), ("a", motion.a)):
             if name in arrays:

@@ -213,6 +213,9 @@ def _change_clip(change: Change, clip: dict[str, Any], layout: _Layout) -> None:
         step = max(step, float(np.spacing(np.abs(np.asarray(clip[key])).max())))
     change.note_rounding(step)
     path = change.clip.path
+    old_rate = _frame_rate(path, clip)
+    if (rate := change.frame_rate(old_rate)) != old_rate:
+        clip["fps"] = _alike(np.array(rate), clip["fps"]) if np.ndim(clip["fps"]) else rate
     position, rounded = _numbers(path, clip, "position", 3), _numbers(path, clip, "quaternion", 4)
     angles = _numbers(path, clip, "joints", None)[:, layout.columns]
     q = configurations(robot, position, to_xyzw(rounded, layout.order), layout.names, angles)

@@ -35,7 +35,7 @@ from dynacom.errors import DynacomError
 from dynacom.missing_contacts import missing_summary, missing_texts, unexplained
 from dynacom.motion_file import Clip, read_motion
 from dynacom.other_contacts import body_statistics, body_texts, seat_statistics
-from dynacom.results_folder import results_folder
+from dynacom.results_folder import save_results
 from dynacom.robots import STANDARD_GRAVITY, Robot, load_robot
 from dynacom.schedule_file import read_schedule, write_schedule
 from dynacom.terrain import ground_heights, terrain_texts
@@ -43,8 +43,10 @@ from dynacom.terrain import ground_heights, terrain_texts
 if TYPE_CHECKING:
     import pandas
 
-# All that may be written of a report.
-_FILES = ("frames.csv", "frames.parquet", "report.html", "schedule.yaml", "summary.json")
+    from dynacom.repair_change import Before
+
+#: All that may be written of a report.
+FILES = ("frames.csv", "frames.parquet", "report.html", "schedule.yaml", "summary.json")
 
 _XYZ = ("_x", "_y", "_z")
 _XY = ("_x", "_y")
@@ -161,7 +163,7 @@ class MotionReport:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """What summary.json holds: docs/verdict.md."""
-        return _without_nan(_summarize(self))
+        return without_nan(_summarize(self))
 
     def __getitem__(self, name: str) -> np.ndarray:
         """An array by its name."""
@@ -222,29 +224,38 @@ class MotionReport:
             DynacomError: the folder cannot be written to, or pyarrow, plotly or viser is not
                 installed.
         """
-        folder = Path(folder)
-        try:
-            with results_folder(folder, _FILES) as temporary:
-                self._write_tables(temporary, csv)
-                text = json.dumps(self.summary, indent=2, ensure_ascii=False, allow_nan=False)
-                (temporary / "summary.json").write_text(text + "\n", encoding="utf-8")
-                write_schedule(self.schedule, self.motion.time, temporary / "schedule.yaml")
-                if page:
-                    from dynacom.page import write_page
+        return save_results(
+            folder, FILES, lambda into: self.write_files(into, self.summary, csv=csv, page=page)
+        )
 
-                    write_page(
-                        temporary / "report.html",
-                        self.robot,
-                        self.motion.q,
-                        self.arrays,
-                        self.summary,
-                    )
-                names = sorted(file.name for file in temporary.iterdir())
-        except OSError as error:
-            raise DynacomError(
-                f"{folder}: cannot be written ({error.strerror or error})"
-            ) from error
-        return [folder / name for name in names]
+    def write_files(
+        self,
+        folder: Path,
+        summary: dict[str, Any],
+        *,
+        csv: bool,
+        page: bool,
+        before: "Before | None" = None,
+    ) -> None:
+        """Writes the files of :meth:`save` into a folder, one after the other.
+
+        Args:
+            summary: which may hold more than the report's.
+            before: the motion before repair, for the page.
+
+        Raises:
+            OSError: a file cannot be written.
+            DynacomError: as :meth:`save`.
+        """
+        self._write_tables(folder, csv)
+        text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+        write_schedule(self.schedule, self.motion.time, folder / "schedule.yaml")
+        if page:
+            from dynacom.page import write_page
+
+            path = folder / "report.html"
+            write_page(path, self.robot, self.motion.q, self.arrays, summary, before=before)
 
     def _write_tables(self, folder: Path, with_csv: bool) -> None:
         """frames.parquet, and frames.csv."""
@@ -678,12 +689,12 @@ def _collect_arrays(
     return arrays
 
 
-def _without_nan(value: Any) -> Any:
+def without_nan(value: Any) -> Any:
     """The value, with null where JSON has no number."""
     if isinstance(value, dict):
-        return {key: _without_nan(item) for key, item in value.items()}
+        return {key: without_nan(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_without_nan(item) for item in value]
+        return [without_nan(item) for item in value]
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value

@@ -93,6 +93,9 @@ def changed_tracking(change: Change, arrays: Arrays) -> dict[str, np.ndarray | N
     changes: dict[str, np.ndarray | None] = {
         "joint_pos": arrays.cast("joint_pos", joint_pos, notes)
     }
+    old_rate = arrays.number("fps") if "fps" in arrays else None
+    if (rate := change.frame_rate(old_rate)) != old_rate:
+        changes["fps"] = arrays.cast("fps", arrays.filled("fps", rate), notes)
     joint_pos = changes["joint_pos"].astype(float)
     if layout.bodies:
         changes |= _changed_bodies(change, arrays, layout, position, quaternion)
@@ -161,7 +164,7 @@ def _changed_bodies(
     moved = [body for body in range(len(written[0])) if body not in others]
     velocity = _body_velocities(change, written[:, moved])
     was = np.dstack([bodies.position, bodies.quaternion])[:, moved]
-    before = _body_velocities(change, was)
+    before = _body_velocities(change, was, before=True)
     for name, part in zip(_VELOCITIES, (slice(0, 3), slice(3, 6)), strict=True):
         if name in arrays:
             values = arrays.numbers(name, *bodies.position.shape).copy()
@@ -175,14 +178,18 @@ def _changed_bodies(
     return changes
 
 
-def _body_velocities(change: Change, pose: np.ndarray) -> np.ndarray:
-    """Linear and angular, in the world's axes, (F, B, 6), of poses (F, B, 7)."""
+def _body_velocities(change: Change, pose: np.ndarray, *, before: bool = False) -> np.ndarray:
+    """Linear and angular, in the world's axes, (F, B, 6), of poses (F, B, 7).
+
+    Args:
+        before: whether at the pace that the clip had.
+    """
     model = pin.Model()
     model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
     velocity = np.empty((*pose.shape[:2], 6))
     for body in range(pose.shape[1]):
         q = change.as_read(pose[:, body], model)
-        v = change.derivatives(q, model).v[change.rows]
+        v = change.derivatives(q, model, before=before).v[change.rows]
         velocity[:, body] = _in_world(q[change.rows, 3:], v)
     return velocity
 

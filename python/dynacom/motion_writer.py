@@ -37,6 +37,7 @@ def write_motion(
     schedule: ContactSchedule | None = None,
     forces: Mapping[str, np.ndarray] | None = None,
     mark: bool = True,
+    stretch: float = 1.0,
 ) -> list[str]:
     """Writes new configurations of a clip in the format of its file.
 
@@ -56,6 +57,8 @@ def write_motion(
             that have them.
         mark: whether to mark the motion as exact, so that it is read without a filter: in the file,
             or, for CSV, by what :func:`mark_of` says, which is to be written beside it.
+        stretch: by which factor the motion is slower: times t become t0 + stretch (t - t0), frame
+            rates are divided by it. Where the file has neither, a note tells the rate.
 
     Returns:
         Notes: sentences on what is not as it was, besides the motion.
@@ -72,7 +75,7 @@ def write_motion(
         raise DynacomError(f"{path}: must end in {suffix}, as {clip.path.name}, got '{path.name}'")
     if path.resolve() == clip.path.resolve() or (path.exists() and path.samefile(clip.path)):
         raise DynacomError(f"{path}: must be another file than the one that was read")
-    change = Change.of(clip, q, schedule, forces, mark)
+    change = Change.of(clip, q, schedule, forces, mark, stretch)
     try:
         content = _WRITERS[suffix](change)
     except OSError as error:

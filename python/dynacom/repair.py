@@ -2,17 +2,30 @@
 """From a motion that physics does not allow to one that it does, and what that took."""
 
 import copy
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dynacom.analysis_options import AnalysisOptions
+from dynacom.contacts_file import write_contacts
 from dynacom.dynacom_pywrap import ContactSchedule, Motion, MotionRepair, MotionRepairer
+from dynacom.errors import DynacomError
+from dynacom.motion_clip import is_point
 from dynacom.motion_file import Clip, read_motion
-from dynacom.motion_report import MotionReport, make_examiner, make_recorded
+from dynacom.motion_mark import mark_of
+from dynacom.motion_report import FILES, MotionReport, make_examiner, make_recorded, without_nan
+from dynacom.motion_writer import write_motion
+from dynacom.repair_change import Before
+from dynacom.repair_summary import repair_summary
+from dynacom.results_folder import save_results
 from dynacom.robots import Robot, load_robot
+
+_CONTACTS_FILE = "contacts.npz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +50,8 @@ class RepairReport:
 
     @property
     def changed(self) -> bool:
-        """Whether the motion is another one now."""
-        raise NotImplementedError
+        """Whether the motion is another one now: not where it was feasible, or nobody knows."""
+        return self.after is not self.before
 
     @property
     def motion(self) -> Motion:
@@ -48,15 +61,40 @@ class RepairReport:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The summary of `after`, with ``repair``, see docs/repair.md."""
-        raise NotImplementedError
+        return self.after.summary | {
+            "repair": without_nan(repair_summary(self.robot, self.repair))
+        }
 
-    def write(self, path: str | Path) -> list[str]:
-        """Writes the motion in the format of the clip's file, see :func:`write_motion`: notes.
+    def write(self, path: str | Path) -> tuple[dict[str, Any], list[str]]:
+        """Writes the motion in the format of the clip's file: as it was where nothing was changed.
 
-        The file's bytes as they were where nothing was changed. Of CSV the mark, see
-        :func:`mark_of`, is to be written beside it.
+        Args:
+            path: the file to write, with the suffix of the clip's.
+
+        Returns:
+            What marks it, which is to be written beside it for CSV, see :func:`mark_of`, with
+            ``exact`` False for what is not marked; and notes, see :func:`write_motion`.
+
+        Raises:
+            DynacomError: as :func:`write_motion`.
         """
-        raise NotImplementedError
+        if not self.changed:
+            _copy(self.clip.path, Path(path))
+            return mark_of(path) | {"exact": self.clip.exact}, []
+        after = self.repair.after
+        forces = {
+            contact.name: contact.wrench[:, : 3 if is_point(self.robot, contact.name) else 6]
+            for contact in after.analysis.contacts
+        }
+        notes = write_motion(
+            self.clip,
+            path,
+            self.repair.recorded.q,
+            schedule=after.schedule,
+            forces=forces,
+            stretch=self.repair.stretch,
+        )
+        return mark_of(path), notes
 
     def save(
         self,
@@ -66,8 +104,42 @@ class RepairReport:
         page: bool = True,
         export_contacts: bool = False,
     ) -> list[Path]:
-        """Writes the motion under its own name, frames.parquet, summary.json, ...: all or none."""
-        raise NotImplementedError
+        """Writes the motion and its report: all of it or nothing.
+
+        The motion has the name and the format of its file. The others are those of
+        :meth:`MotionReport.save`, with ``repair`` in the summary and the motion before in the page,
+        and are replaced, or taken away if they are not wanted now, as there.
+
+        Args:
+            folder: made if it is not there; not that of the clip's file.
+            csv, page: whether to write frames.csv, and report.html.
+            export_contacts: whether to write contacts.npz, see :func:`contact_arrays`.
+
+        Returns:
+            The files.
+
+        Raises:
+            DynacomError: as :meth:`MotionReport.save`; the motion's file would be that of the clip,
+                or has the name of another one here.
+        """
+        name, others = self.clip.path.name, (*FILES, _CONTACTS_FILE)
+        if name in others:
+            raise DynacomError(f"{self.clip.path}: is called as a result is: it needs another name")
+        if (Path(folder) / name).resolve() == self.clip.path.resolve():
+            raise DynacomError(f"{folder}: must be another folder than that of the motion, {name}")
+
+        def write(into: Path) -> None:
+            mark, notes = self.write(into / name)
+            summary = self.summary | {
+                "repair": self.summary["repair"] | mark,
+                "notes": [*self.summary["notes"], *notes],
+            }
+            before = Before(self.before.motion.q, self.before.arrays, self.before.summary)
+            self.after.write_files(into, summary, csv=csv, page=page, before=before)
+            if export_contacts:
+                write_contacts(self.after, into / _CONTACTS_FILE)
+
+        return save_results(folder, others, write)
 
 
 def repair(
@@ -142,4 +214,31 @@ def repair_clip(
     Raises:
         DynacomError: as there.
     """
-    raise NotImplementedError
+    recorded, schedule_text = make_recorded(clip, robot, schedule)
+    try:
+        found = repairer.repair(recorded)
+    except ValueError as error:
+        raise DynacomError(f"{clip.path}: {error}") from error
+    before = after = MotionReport(clip, robot, options, found.before, schedule_text)
+    if found.outcome != "feasible" and found.before.verdict.outcome != "unknown":
+        # Forces in the file were those of the motion before.
+        repaired = replace(
+            clip,
+            time=np.array(found.recorded.time),
+            q=np.array(found.recorded.q),
+            v=None,
+            a=None,
+            forces={},
+            exact=True,
+        )
+        after = MotionReport(repaired, robot, options, found.after, schedule_text)
+    return RepairReport(clip, robot, options, found, before, after)
+
+
+def _copy(source: Path, path: Path) -> None:
+    if path.exists() and path.samefile(source):
+        raise DynacomError(f"{path}: must be another file than the one that was read")
+    try:
+        shutil.copyfile(source, path)
+    except OSError as error:
+        raise DynacomError(f"{path}: cannot be written ({error.strerror or error})") from error

@@ -5,9 +5,36 @@ import errno
 import os
 import secrets
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from dynacom.errors import DynacomError
+
+
+def save_results(
+    folder: str | Path, own: Iterable[str], write: Callable[[Path], None]
+) -> list[Path]:
+    """Files that appear in a folder when all of them are written.
+
+    Args:
+        folder, own: as in :func:`results_folder`.
+        write: writes them into the folder that it is given.
+
+    Returns:
+        The files.
+
+    Raises:
+        DynacomError: the folder cannot be written to.
+    """
+    folder = Path(folder)
+    try:
+        with results_folder(folder, own) as temporary:
+            write(temporary)
+            names = sorted(file.name for file in temporary.iterdir())
+    except OSError as error:
+        raise DynacomError(f"{folder}: cannot be written ({error.strerror or error})") from error
+    return [folder / name for name in names]
 
 
 @contextmanager

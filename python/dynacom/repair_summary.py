@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""What a repair did, in numbers and in words: the entry ``repair`` of a summary."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from dynacom.dynacom_pywrap import (
+    MotionExamination,
+    MotionRepair,
+    RepairChange,
+    RepairStep,
+)
+from dynacom.robots import Robot
+
+
+def repair_summary(robot: Robot, repair: MotionRepair) -> dict[str, Any]:
+    """The entry, see docs/repair.md, but for the file that the motion is written to."""
+    before, after = repair.before, repair.after
+    rungs = [_rung(step, before) for step in repair.steps]
+    found = {"outcome": repair.outcome}
+    for ending, examination in (("_before", before), ("", after), ("_filtered", repair.filtered)):
+        found[f"verdict{ending}"] = examination.verdict.outcome
+        found[f"codes{ending}"] = examination.verdict.codes
+    return found | {
+        "missing_before": _missing(before, repair.missing_before),
+        "missing": _missing(after, repair.missing),
+        "stretch": repair.stretch,
+        "root": _change(repair, repair.root),
+        "joints": _change(repair, repair.joints) | {"joint": repair.joints.joint or None},
+        "com": _change(repair, repair.com),
+        "stances": _stances(robot, repair),
+        "limits": _limits(rungs),
+        "rungs": rungs,
+        "reasons": [
+            {"code": reason.code, "time": reason.time, "text": reason.text}
+            for reason in repair.reasons
+        ],
+    }
+
+
+def _missing(found: MotionExamination, frames: int) -> dict[str, Any]:
+    return {
+        "force_rms": found.statistics.residual_force_rms,
+        "torque_rms": found.statistics.residual_torque_rms,
+        "frames": frames,
+    }
+
+
+def _change(repair: MotionRepair, change: RepairChange) -> dict[str, Any]:
+    time = float(repair.recorded.time[change.frame])
+    return {"rms": change.rms, "largest": change.largest, "time": time}
+
+
+# Stances.
+
+
+def _stances(robot: Robot, repair: MotionRepair) -> dict[str, Any]:
+    """Those of the last step, of the robot's contacts."""
+    stances = [stance for stance in repair.stances if stance.contact < len(robot.contacts)]
+    speeds = [_largest_speed(found) for found in (repair.before, repair.after)]
+    drifts = [
+        max((_drift(repair, found, stance) for stance in stances), default=None)
+        for found in (repair.before, repair.after)
+    ]
+    return {
+        "count": len(stances),
+        "held": sum(stance.is_still for stance in stances),
+        "largest_speed_before": speeds[0],
+        "largest_speed": speeds[1],
+        "largest_drift_before": drifts[0],
+        "largest_drift": drifts[1],
+    }
+
+
+def _largest_speed(found: MotionExamination) -> float:
+    """Of what is judged as ``foot_sliding`` [m/s]."""
+    return found.verdict.findings["foot_sliding"].worst
+
+
+def _drift(repair: MotionRepair, found: MotionExamination, stance: Any) -> float:
+    """The largest distance of a part that carries in a stance from where it is on average [m].
+
+    Which parts carry when is that of the motion after, before and after.
+    """
+    after = repair.after
+    frames = slice(stance.first, stance.behind)
+    carried = found.inference.ground_velocity * (found.derived.motion.time[frames, None])
+    active = np.asarray(after.inference.schedule.active)[frames]
+    largest = 0.0
+    for index, (part, motion) in enumerate(zip(after.parts, found.part_motions, strict=False)):
+        carries = active[:, index].astype(bool)
+        if part.contact != stance.contact or not carries.any():
+            continue
+        places = (motion.position[frames] - carried)[carries]
+        distances = np.linalg.norm(places - places.mean(axis=0), axis=1)
+        largest = max(largest, float(distances.max()))
+    return largest
+
+
+# Steps.
+
+
+def _limits(rungs: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """How far joints were beyond their limits, and are; None where that was not looked at."""
+    rung = next((rung for rung in rungs if rung["name"] == "joints"), None)
+    if rung is None:
+        return None
+    return {"before": rung["before"], "after": rung["after" if rung["kept"] else "before"]}
+
+
+def _rung(step: RepairStep, before: MotionExamination) -> dict[str, Any]:
+    counts = {}
+    if step.rung == "balance":
+        counts = {
+            "missing_frames_before": int(step.before),
+            "missing_frames_after": int(step.after),
+        }
+    return {
+        "name": step.rung,
+        "before": step.before,
+        "after": step.after,
+        "kept": step.is_kept,
+        "text": " ".join(_rung_texts(step, before)),
+        **counts,
+    }
+
+
+def _rung_texts(step: RepairStep, before: MotionExamination) -> Iterator[str]:
+    """What a step did, and what it gained."""
+    if step.rung == "filter":
+        yield (
+            f"The motion was filtered at {before.derived.cutoff:g} Hz, which moved the root by "
+            f"{1e3 * step.after:.2g} mm (RMS)."
+        )
+    elif step.rung == "schedule":
+        yield (
+            "Contacts were found anew, as in an exact motion: the distance to a feasible one is "
+            f"{_millimetres(step.after)} with these, and was {_millimetres(step.before)}."
+        )
+    elif step.rung == "balance":
+        yield (
+            f"Wrenches were brought within reach: {step.after:.0f} frames are out of reach, and "
+            f"{step.before:.0f} were."
+        )
+    elif step.rung == "feet":
+        yield (
+            "Contacts were held still and level with their ground: they slide by up to "
+            f"{1e3 * step.after:.3g} mm/s, and did by {1e3 * step.before:.3g} mm/s."
+        )
+    elif step.rung == "joints":
+        yield (
+            "Joints were brought within their limits: one is up to "
+            f"{np.degrees(step.after):.2g}° beyond, and was {np.degrees(step.before):.2g}°."
+        )
+    else:
+        yield f"Time was stretched by a factor of {step.after:g}."
+    if not step.is_kept:
+        yield "That did not help: the motion stays as it was before this step."
+
+
+def _millimetres(value: float) -> str:
+    return "not known" if np.isnan(value) else f"{1e3 * value:.2g} mm"
