@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import NamedTuple
 
-from dynacom.batch_row import FramesError, Job, Judge, Row, error_row
+from dynacom.batch_repair import WritingError
+from dynacom.batch_row import Job, Judge, Row, error_row
 from dynacom.errors import DynacomError
 
 # A worker has one more clip than it works on, so that it need not wait for the next.
@@ -31,6 +32,7 @@ class Task(NamedTuple):
     name: str
     file: str
     known: str | None
+    place: str | None = None
 
 
 class Done(NamedTuple):
@@ -68,7 +70,7 @@ class Pool:
             What is done; and None now and then, when nothing is.
 
         Raises:
-            DynacomError: workers cannot be started, or cannot write frames.
+            DynacomError: workers cannot be started, or cannot write results.
         """
         tasks = iter(tasks)
         again: deque[Task] = deque()
@@ -164,10 +166,10 @@ class _Worker:
 
         Raises:
             EOFError, OSError: the worker has died.
-            FramesError: it cannot write frames.
+            WritingError: it cannot write results.
         """
         reply = self.connection.recv()
-        if isinstance(reply, FramesError):
+        if isinstance(reply, WritingError):
             raise reply
         self.has_started = True
         if reply is None:
@@ -200,7 +202,7 @@ def work(descriptor: int) -> None:
         while True:
             task = pipe.recv()
             try:
-                pipe.send(Done(task.index, judge(task.name, task.file, task.known)))
-            except FramesError as error:
+                pipe.send(Done(task.index, judge(*task[1:])))
+            except WritingError as error:
                 pipe.send(error)
                 return

@@ -45,19 +45,14 @@ REASONS = {code: text for code, (_, text) in FAULTS.items()} | {
     "too_short": TOO_SHORT,
 }
 
-# Of the folder of repaired motions: where they are until they are whole.
-_WRITING = ".writing"
+#: Of a folder that workers write to: where files are until they are whole.
+WRITING = ".writing"
 # Formats that cannot be marked as exact.
 _UNMARKED = (".csv", ".csv.gz")
 
 
 class WritingError(DynacomError):
     """Results of a clip cannot be written: not its fault, nor would the next one do better."""
-
-
-def remove_unfinished(folder: Path) -> None:
-    """Removes what was being written, by a batch that has ended, to a folder for results."""
-    shutil.rmtree(folder / _WRITING, ignore_errors=True)
 
 
 def repair_row(report: RepairReport) -> dict[str, Any]:
@@ -150,21 +145,21 @@ class RepairedFile:
             return
         content = self._read()
         path = self._folder / self._place
-        temporary = self._folder / _WRITING / secrets.token_hex(8)
+        temporary = self._folder / WRITING / secrets.token_hex(8)
         with _writing(self._folder):
-          try:
-            for parent in (path.parent, temporary):
-                parent.mkdir(parents=True, exist_ok=True)
-            written = temporary / path.name
-            _write(written, content)
-            # The mark first: who finds the file finds that, too.
-            if self._is_exact and suffix_of(path) in _UNMARKED:
-                text = json.dumps({"repair": mark_of(written)})
-                _write(_mark_path(written), text.encode())
-                os.replace(_mark_path(written), _mark_path(path))
-            os.replace(written, path)
-          finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+            try:
+                for parent in (path.parent, temporary):
+                    parent.mkdir(parents=True, exist_ok=True)
+                written = temporary / path.name
+                _write(written, content)
+                # The mark first: who finds the file finds that, too.
+                if self._is_exact and suffix_of(path) in _UNMARKED:
+                    text = json.dumps({"repair": mark_of(written)})
+                    _write(_mark_path(written), text.encode())
+                    os.replace(_mark_path(written), _mark_path(path))
+                os.replace(written, path)
+            finally:
+                shutil.rmtree(temporary, ignore_errors=True)
 
     def _change(self, report: RepairReport) -> None:
         change = report.change()

@@ -20,6 +20,7 @@ from dynacom.analysis_options import AnalysisOptions
 from dynacom.batch_files import local_copy, printable
 from dynacom.batch_repair import (
     REPAIR_COLUMNS,
+    WRITING,
     RepairedFile,
     WritingError,
     remove_repaired,
@@ -537,7 +538,7 @@ def _write_frames(
         array = pyarrow.array(values.tolist() if values.dtype.kind == "U" else values)
         fields.append(pyarrow.field(column, array.type, metadata={"unit": unit}))
         arrays.append(array)
-    temporary = folder / ".writing" / f"{path.stem}-{secrets.token_hex(4)}.parquet"
+    temporary = folder / WRITING / f"{path.stem}-{secrets.token_hex(4)}.parquet"
     try:
         for parent in (path.parent, temporary.parent):
             parent.mkdir(parents=True, exist_ok=True)

@@ -15,6 +15,7 @@ from dynacom.analysis_options import AnalysisOptions
 from dynacom.contacts_file import write_contacts
 from dynacom.dynacom_pywrap import ContactSchedule, Motion, MotionRepair, MotionRepairer
 from dynacom.errors import DynacomError
+from dynacom.motion_change import Change
 from dynacom.motion_clip import is_point
 from dynacom.motion_file import Clip, read_motion
 from dynacom.motion_mark import mark_of
@@ -61,9 +62,7 @@ class RepairReport:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The summary of `after`, with ``repair``, see docs/repair.md."""
-        return self.after.summary | {
-            "repair": without_nan(repair_summary(self.robot, self.repair))
-        }
+        return self.after.summary | {"repair": without_nan(repair_summary(self.robot, self.repair))}
 
     def write(self, path: str | Path) -> tuple[dict[str, Any], list[str]]:
         """Writes the motion in the format of the clip's file: as it was where nothing was changed.
@@ -81,20 +80,30 @@ class RepairReport:
         if not self.changed:
             _copy(self.clip.path, Path(path))
             return mark_of(path) | {"exact": self.clip.exact}, []
+        notes = write_motion(self.clip, path, **self._arguments())
+        return mark_of(path), notes
+
+    def change(self) -> Change:
+        """What of the clip's file is another thing now, for whoever writes several clips at once.
+
+        Raises:
+            DynacomError: as :func:`write_motion`.
+        """
+        return Change.of(self.clip, mark=True, **self._arguments())
+
+    def _arguments(self) -> dict[str, Any]:
+        """Of :func:`write_motion`."""
         after = self.repair.after
         forces = {
             contact.name: contact.wrench[:, : 3 if is_point(self.robot, contact.name) else 6]
             for contact in after.analysis.contacts
         }
-        notes = write_motion(
-            self.clip,
-            path,
-            self.repair.recorded.q,
-            schedule=after.schedule,
-            forces=forces,
-            stretch=self.repair.stretch,
-        )
-        return mark_of(path), notes
+        return {
+            "q": self.repair.recorded.q,
+            "schedule": after.schedule,
+            "forces": forces,
+            "stretch": self.repair.stretch,
+        }
 
     def save(
         self,
@@ -171,11 +180,7 @@ def repair(
     Raises:
         DynacomError, ValueError: as :func:`analyze`; a clip of fewer than four frames.
     """
-    options = AnalysisOptions() if options is None else copy.deepcopy(options)
-    if balance_only:
-        options.repair.feet = options.repair.joints = False
-    if strict:
-        options.ladder.strict = True
+    options = repair_options(options, balance_only=balance_only, strict=strict)
     if stretch is not None:
         options.ladder.largest_stretch = stretch
     options.validate()
@@ -185,6 +190,18 @@ def repair(
         motion = read_motion(motion, robot, fps=fps, quat=quat, trust=trust, clip=clip)
     repairer = make_repairer(robot, options, threads=threads, progress=progress)
     return repair_clip(motion, robot, options, repairer, schedule)
+
+
+def repair_options(
+    options: AnalysisOptions | None, *, balance_only: bool, strict: bool
+) -> AnalysisOptions:
+    """A copy of the options, or of their defaults, with what :func:`repair` was asked for."""
+    options = AnalysisOptions() if options is None else copy.deepcopy(options)
+    if balance_only:
+        options.repair.feet = options.repair.joints = False
+    if strict:
+        options.ladder.strict = True
+    return options
 
 
 def make_repairer(robot: Robot, options: AnalysisOptions, **others: Any) -> MotionRepairer:
