@@ -45,6 +45,52 @@ def hover(path: Path, start: int, frames: int) -> Path:
     return cut(path, start, frames, contacts=np.zeros((frames, 4), dtype=bool))
 
 
+def hurry(path: Path, start: int, frames: int) -> Path:
+    """A piece of the trot at twice its pace: not feasible, but it can be repaired."""
+    with np.load(WALKS / "anymal_trot.npz") as file:
+        time = file["t"][start : start + frames] / 2.0
+    return cut(path, start, frames, "anymal_trot", t=time, v=None, a=None)
+
+
+def write_repairable(folder: Path, robot: Robot) -> dict[str, str]:
+    """Clips for repair at 100 frames a second, and a file that is none.
+
+    Returns:
+        Where each file lies -> what becomes of it, or of its clips, with + between them.
+    """
+    (folder / "sub").mkdir(parents=True)
+    cut(folder / "calm.npz", 0, 30)
+    hurry(folder / "sub" / "fast.npz", 20, 50)
+    hover(folder / "sub" / "air.npz", 0, 40)
+    cut(folder / "short.npz", 100, 3, v=None, a=None)
+    for name, walk in (("calm.csv", "anymal_walk"), ("fast.csv", "anymal_trot")):
+        with np.load(WALKS / f"{walk}.npz") as file:
+            np.savetxt(folder / name, file["q"][40:80], delimiter=",", fmt="%.9f")
+    calm, fast = motion(robot, 20, 40), motion(robot, 20, 40) | {"fps": 150.0}
+    rising = motion(robot, 20, 40)
+    rising["root_pos"] = rising["root_pos"] + np.outer(np.arange(40), [0.0, 0.0, 0.02])
+    broken = motion(robot, 0, 5) | {"root_rot": np.zeros((5, 4))}
+    clips = {"calm": calm, "fast": fast, "rising": rising, "broken": broken}
+    (folder / "many.pkl").write_bytes(pickle.dumps(clips))
+    (folder / "calm.pkl").write_bytes(pickle.dumps({"one": calm, "two": motion(robot, 60, 40)}))
+    (folder / "fast.pkl").write_bytes(pickle.dumps(fast))
+    (folder / "rising.pkl").write_bytes(pickle.dumps({"one": rising, "two": broken}))
+    (folder / "broken.csv").touch()
+    return {
+        "broken.csv": "error",
+        "calm.csv": "feasible",
+        "calm.npz": "feasible",
+        "calm.pkl": "feasible+feasible",
+        "fast.csv": "repaired",
+        "fast.pkl": "repaired",
+        "many.pkl": "feasible+repaired+not repaired+error",
+        "rising.pkl": "not repaired+error",
+        "short.npz": "not repaired",
+        "sub/air.npz": "not repaired",
+        "sub/fast.npz": "repaired",
+    }
+
+
 def write_clips(folder: Path) -> dict[str, str]:
     """Clips and broken files, in subfolders too: file's name in results -> part of its error."""
     (folder / "sub").mkdir(parents=True)
