@@ -52,8 +52,19 @@ def hurry(path: Path, start: int, frames: int) -> Path:
     return cut(path, start, frames, "anymal_trot", t=time, v=None, a=None)
 
 
+def write_csv(path: Path, robot: Robot, walk: str, rate: float) -> Path:
+    """A piece of a bundled walk at so many frames a second; 50 are its own."""
+    with np.load(WALKS / f"{walk}.npz") as file:
+        q = file["q"][40:80]
+    names = ["t", *(f"root_{name}" for name in ("x", "y", "z", "qx", "qy", "qz", "qw"))]
+    table = np.column_stack([np.arange(len(q)) / rate, q])
+    header = ",".join([*names, *robot.joints.names])
+    np.savetxt(path, table, delimiter=",", fmt="%.9f", header=header, comments="")
+    return path
+
+
 def write_repairable(folder: Path, robot: Robot) -> dict[str, str]:
-    """Clips for repair at 100 frames a second, and a file that is none.
+    """Clips for repair, and files that are none.
 
     Returns:
         Where each file lies -> what becomes of it, or of its clips, with + between them.
@@ -63,9 +74,8 @@ def write_repairable(folder: Path, robot: Robot) -> dict[str, str]:
     hurry(folder / "sub" / "fast.npz", 20, 50)
     hover(folder / "sub" / "air.npz", 0, 40)
     cut(folder / "short.npz", 100, 3, v=None, a=None)
-    for name, walk in (("calm.csv", "anymal_walk"), ("fast.csv", "anymal_trot")):
-        with np.load(WALKS / f"{walk}.npz") as file:
-            np.savetxt(folder / name, file["q"][40:80], delimiter=",", fmt="%.9f")
+    write_csv(folder / "calm.csv", robot, "anymal_walk", 50.0)
+    write_csv(folder / "fast.csv", robot, "anymal_trot", 100.0)
     calm, fast = motion(robot, 20, 40), motion(robot, 20, 40) | {"fps": 150.0}
     rising = motion(robot, 20, 40)
     rising["root_pos"] = rising["root_pos"] + np.outer(np.arange(40), [0.0, 0.0, 0.02])
