@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-2-Clause
-// Talos on its two soles, and the crouches that lessons 4 and 5 judge.
+// Talos on its two soles, and the crouches that lessons 4 to 6 judge.
 #pragma once
 
 #include <cmath>

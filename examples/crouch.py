@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-2-Clause
-"""The crouches that lessons 4 and 5 judge."""
+"""The crouches that lessons 4 to 6 judge."""
 
 import numpy as np
 import pinocchio

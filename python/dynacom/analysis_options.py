@@ -45,6 +45,8 @@ from dynacom.yaml_file import is_number, parse_yaml, read_yaml
 
 #: What a cut-off is called that suits the motion.
 AUTO = "auto"
+# What is not good after so many rounds never is.
+_MOST_ROUNDS = 1000
 
 
 @dataclass(slots=True)
@@ -69,8 +71,10 @@ class LadderSettings:
 
     def validate(self) -> None:
         """Raises ValueError, naming the first setting out of its range."""
-        if self.rounds < 1:
-            raise ValueError(f"LadderSettings.rounds must be >= 1, got {self.rounds}")
+        if not 1 <= self.rounds <= _MOST_ROUNDS:
+            raise ValueError(
+                f"LadderSettings.rounds must be from 1 to {_MOST_ROUNDS}, got {self.rounds}"
+            )
         for name in ("largest_displacement", "largest_turn"):
             if not (math.isfinite(value := getattr(self, name)) and value > 0.0):
                 raise ValueError(f"LadderSettings.{name} must be finite and > 0, got {value:g}")

@@ -2,26 +2,30 @@
 """The command ``dynacom``.
 
 Exit status 0 when what was asked for was done, whatever came out; 1 where ``--check`` asked whether
-a motion is feasible, or at least repairable, and it is not, or nobody knows; 2 for bad input, which
-one line on stderr explains.
+a motion is feasible, or at least repairable, and it is not, or nobody knows, and after ``repair``
+still not; 2 for bad input, which one line on stderr explains.
 """
 
 import functools
 import inspect
+import json
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from itertools import zip_longest
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 from typer.core import TyperCommand
 
 import dynacom
 from dynacom.errors import DynacomError
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 # Nothing of rich is imported here, nor by `import dynacom`: --version and --help shall not wait.
 
@@ -269,10 +273,17 @@ class _ClipRequest(_Request):
 
     def analyze(self, clip: Path) -> "dynacom.MotionReport":
         """Judges the motion, with a progress bar."""
+        return self._run(dynacom.analyze, clip, "Analysing")
+
+    def repair(self, clip: Path, **how: Any) -> "dynacom.RepairReport":
+        """Repairs the motion, with a progress bar; `how` are arguments of :func:`repair`."""
+        return self._run(dynacom.repair, clip, "Repairing", **how)
+
+    def _run(self, function: Callable[..., Any], clip: Path, title: str, **others: Any) -> Any:
         robot = self.load_robot()
         options = self.make_options(robot)
-        with _progress() as progress:
-            return dynacom.analyze(
+        with _progress(title) as progress:
+            return function(
                 clip,
                 robot,
                 schedule=self.schedule,
@@ -280,6 +291,7 @@ class _ClipRequest(_Request):
                 progress=progress,
                 clip=self.clip_name,
                 **self.reading(),
+                **others,
             )
 
 
@@ -313,11 +325,11 @@ def _with_options(function: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-# What ``--check`` may ask for: the verdicts that pass.
+# What ``--check`` may ask for: the verdicts that pass, and outcomes of repair.
 _CHECKS = {"feasible": ("feasible",), "repairable": ("feasible", "repairable")}
 
 
-class _AnalyzeCommand(TyperCommand):
+class _CheckCommand(TyperCommand):
     """A command whose option ``--check`` may stand without its value, which is then feasible."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -329,7 +341,36 @@ class _AnalyzeCommand(TyperCommand):
         return super().parse_args(ctx, given)
 
 
-@app.command(cls=_AnalyzeCommand)
+_Csv = Annotated[bool, typer.Option("--csv", help="Write frames.csv, too.")]
+_Page = Annotated[
+    bool, typer.Option("--page/--no-page", help="Write report.html? It takes the longest.")
+]
+_Check = Annotated[
+    str | None,
+    typer.Option(
+        "--check",
+        metavar="[feasible|repairable]",
+        help="Exit with status 1 unless the motion is feasible, or at least repairable.",
+    ),
+]
+
+
+def _require_check(check: str | None) -> None:
+    if check not in (None, *_CHECKS):
+        raise DynacomError(f"check must be {' or '.join(_CHECKS)}, got '{check}'")
+
+
+def _default_folder(clip: Path, ending: str) -> Path:
+    """Where you are, named after the clip."""
+    return Path(f"{Path(clip.name.removesuffix('.gz')).stem}-{ending}")
+
+
+def _print_files(console: "Console", files: Iterable[Path]) -> None:
+    for file in files:
+        console.print(f"Wrote {file}", highlight=False, markup=False, soft_wrap=True)
+
+
+@app.command(cls=_CheckCommand)
 @_with_options
 def analyze(
     request: _ClipRequest,
@@ -342,18 +383,9 @@ def analyze(
             "by default.",
         ),
     ] = None,
-    csv: Annotated[bool, typer.Option("--csv", help="Write frames.csv, too.")] = False,
-    page: Annotated[
-        bool, typer.Option("--page/--no-page", help="Write report.html? It takes the longest.")
-    ] = True,
-    check: Annotated[
-        str | None,
-        typer.Option(
-            "--check",
-            metavar="[feasible|repairable]",
-            help="Exit with status 1 unless the motion is feasible, or at least repairable.",
-        ),
-    ] = None,
+    csv: _Csv = False,
+    page: _Page = True,
+    check: _Check = None,
 ) -> None:
     """Judge a motion: is it physically possible, when not and why, what do the feet feel?
 
@@ -363,18 +395,85 @@ def analyze(
 
     from dynacom.summary import summary_table
 
-    if check not in (None, *_CHECKS):
-        raise DynacomError(f"check must be {' or '.join(_CHECKS)}, got '{check}'")
+    _require_check(check)
     report = request.analyze(clip)
-    name = Path(clip.name.removesuffix(".gz")).stem
     with Console(stderr=True).status("Writing the results", spinner="line"):
-        files = report.save(out or Path(f"{name}-analysis"), csv=csv, page=page)
+        files = report.save(out or _default_folder(clip, "analysis"), csv=csv, page=page)
     console = Console()
     console.print(summary_table(report.summary))
-    for file in files:
-        console.print(f"Wrote {file}", highlight=False, markup=False, soft_wrap=True)
+    _print_files(console, files)
     if check is not None and report.verdict.outcome not in _CHECKS[check]:
         raise typer.Exit(1)
+
+
+@app.command(cls=_CheckCommand)
+@_with_options
+def repair(
+    request: _ClipRequest,
+    clip: _Clip,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder for the motion and its report, made if it is not there; CLIP-repaired, "
+            "where you are, by default.",
+        ),
+    ] = None,
+    balance_only: Annotated[
+        bool,
+        typer.Option(
+            "--balance-only", help="Look after forces only: not after feet, nor joints' limits."
+        ),
+    ] = False,
+    strict: Annotated[
+        bool,
+        typer.Option(
+            "--strict", help="Mend single frames, too, of motions that are feasible as a whole."
+        ),
+    ] = False,
+    stretch: Annotated[
+        float | None,
+        typer.Option(
+            metavar="FACTOR", help="Slow the motion down, by at most this, if nothing else helps."
+        ),
+    ] = None,
+    export_contacts: Annotated[
+        bool,
+        typer.Option(
+            "--export-contacts", help="Write contacts.npz, for training: see docs/files.md."
+        ),
+    ] = False,
+    csv: _Csv = False,
+    page: _Page = True,
+    check: _Check = None,
+) -> None:
+    """Make a motion feasible: the smallest change after which its contacts can give what it needs.
+
+    Writes into DIR the motion, in the format of its file, and its report: report.html,
+    frames.parquet, summary.json and schedule.yaml. Prints what was changed, and what could not be.
+    """
+    from rich.console import Console
+
+    from dynacom.summary import repair_table
+
+    _require_check(check)
+    report = request.repair(clip, balance_only=balance_only, strict=strict, stretch=stretch)
+    with Console(stderr=True).status("Writing the results", spinner="line"):
+        folder = out or _default_folder(clip, "repaired")
+        files = report.save(folder, csv=csv, page=page, export_contacts=export_contacts)
+    # With what there was to say as the motion was written.
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    console = Console()
+    console.print(repair_table(summary))
+    _print_files(console, files)
+    if check is not None and not _passes(report, check):
+        raise typer.Exit(1)
+
+
+def _passes(report: "dynacom.RepairReport", check: str) -> bool:
+    if report.outcome != "not repaired":
+        return True
+    return check == "repairable" and report.after.verdict.outcome in _CHECKS[check]
 
 
 @app.command()
@@ -519,7 +618,7 @@ def _parse_shard(text: str) -> tuple[int, int]:
 
 
 @contextmanager
-def _progress() -> Iterator[Callable[[float], None]]:
+def _progress(title: str) -> Iterator[Callable[[float], None]]:
     """A progress bar on stderr, if that is a terminal: a function that takes the part done."""
     from rich.console import Console
     from rich.progress import (
@@ -536,7 +635,7 @@ def _progress() -> Iterator[Callable[[float], None]]:
         yield lambda part: None
         return
     with Progress(
-        TextColumn("Analysing"),
+        TextColumn(title),
         BarColumn(),
         TaskProgressColumn(),
         TimeRemainingColumn(),

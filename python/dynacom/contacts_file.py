@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dynacom.motion_joints import rotations
 from dynacom.motion_report import MotionReport
-from dynacom.scene import rotation_matrices
 
 
 def contact_arrays(report: MotionReport) -> dict[str, np.ndarray]:
@@ -28,7 +28,7 @@ def contact_arrays(report: MotionReport) -> dict[str, np.ndarray]:
         return np.array(arrays).reshape(len(names), frames, *shape).swapaxes(0, 1)
 
     wrenches = stack([contact.wrench for contact in contacts], 6)
-    rotation = stack([rotation_matrices(moved.rotation) for moved in found.contacts], 3, 3)
+    rotation = stack([rotations(moved.rotation) for moved in found.contacts], 3, 3)
     cop = stack([np.pad(contact.cop, ((0, 0), (0, 1))) for contact in contacts], 3)
     place = stack([moved.position for moved in found.contacts], 3)
     frame = np.arange(frames)

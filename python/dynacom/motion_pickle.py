@@ -215,7 +215,7 @@ def _change_clip(change: Change, clip: dict[str, Any], layout: _Layout) -> None:
     path = change.clip.path
     old_rate = _frame_rate(path, clip)
     if (rate := change.frame_rate(old_rate)) != old_rate:
-        clip["fps"] = _alike(np.array(rate), clip["fps"]) if np.ndim(clip["fps"]) else rate
+        clip["fps"] = _rate_alike(rate, clip["fps"])
     position, rounded = _numbers(path, clip, "position", 3), _numbers(path, clip, "quaternion", 4)
     angles = _numbers(path, clip, "joints", None)[:, layout.columns]
     q = configurations(robot, position, to_xyzw(rounded, layout.order), layout.names, angles)
@@ -240,6 +240,13 @@ def _alike(values: np.ndarray, old: Any) -> Any:
         return values.tolist()
     is_whole = old.dtype.kind not in "iu" or (values == np.rint(values)).all()
     return values.astype(old.dtype) if is_whole else values
+
+
+def _rate_alike(rate: float, old: Any) -> Any:
+    """The same of a single number, which Python's own may be."""
+    if np.ndim(old):
+        return _alike(np.array(rate), old)
+    return int(rate) if isinstance(old, int) and rate.is_integer() else rate
 
 
 def _load(path: Path, trust: bool) -> Any:

@@ -490,8 +490,11 @@ def _derivatives_text(clip: Clip, derived: DerivedMotion, options: AnalysisOptio
         )
     if derived.time_error > 1e-6:
         how += f", with times made even, by up to {1e3 * derived.time_error:.2g} ms"
+    is_marked = derived.is_automatic and derived.is_told_exact
+    if is_marked:
+        reason = "the file is marked as exact, as dynacom repair marks what it writes"
     text = f"Velocities and accelerations are computed from the positions, {how}: {reason}."
-    if derived.is_automatic:
+    if derived.is_automatic and not is_marked:
         text += f" {_cutoff_text(derived)}"
     if unsure := int(np.count_nonzero(derived.unsure)):
         text += (
@@ -503,8 +506,6 @@ def _derivatives_text(clip: Clip, derived: DerivedMotion, options: AnalysisOptio
 
 def _cutoff_text(derived: DerivedMotion) -> str:
     """Why the cut-off is what it is."""
-    if derived.is_told_exact:
-        return "The file is marked as exact, as dynacom repair writes it: it is not filtered."
     if np.isnan(derived.noise):
         return f"There are too few frames to tell how noisy they are: {derived.cutoff:g} Hz."
     noise = f"without a filter, the noise of the accelerations is {derived.noise:.2g} g"

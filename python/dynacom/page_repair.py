@@ -114,7 +114,7 @@ def _file_text(repair: Mapping[str, Any]) -> str:
         return ""
     text = f"Written to <b>{escape(repair['file'])}</b>"
     if repair.get("exact") is not None:
-        text += ", exactly" if repair["exact"] else ", rounded"
+        text += ", marked as exact" if repair["exact"] else ", without a mark"
     if repair.get("sha256"):
         text += f' (SHA-256 <span class="sum">{escape(repair["sha256"])}</span>)'
     return f"{text}."

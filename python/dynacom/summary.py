@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """Summaries of a motion, and of many, to be printed."""
 
+import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
@@ -74,11 +76,97 @@ def summary_table(summary: dict[str, Any]) -> Table:
             escape(f"Measured on {name}"),
             f"f_z differs by {_number(compared['bias'][2])} N, {_number(compared['rms'][2])} N RMS",
         )
-    if summary["notes"]:
-        table.add_section()
-        for note in summary["notes"]:
-            table.add_row("Note", escape(note))
+    _add_notes(table, summary["notes"])
     return table
+
+
+# Of outcomes of repair, where they are printed.
+_OUTCOME_COLORS = {"feasible": "green", "repaired": "green", "not repaired": "red"}
+
+
+def repair_table(summary: dict[str, Any]) -> Table:
+    """The summary of a :class:`RepairReport`, as a table of two columns: before → after."""
+    repair = summary["repair"]
+    table = Table(show_header=False)
+    table.add_column(style="bold", overflow="fold")
+    table.add_column(overflow="fold")
+
+    color = _OUTCOME_COLORS[repair["outcome"]]
+    table.add_row("Repair", f"[{color}]{repair['outcome']}[/]")
+    for reason in repair["reasons"]:
+        when = "" if reason["time"] is None else f" (at {reason['time']:.2f} s)"
+        table.add_row(f"  {reason['code']}", escape(f"{reason['text']}{when}"))
+    table.add_section()
+    verdicts = [_verdict_text(repair, ending) for ending in ("_before", "")]
+    table.add_row("Verdict", " → ".join(verdicts))
+    table.add_row("  without the mark", _verdict_text(repair, "_filtered"))
+    for title, texts in _compared(repair, summary["frames"]):
+        table.add_row(title, " → ".join(texts))
+    stances = repair["stances"]
+    if stances["count"]:
+        table.add_row("Stances held still", f"{stances['held']} of {stances['count']}")
+    table.add_section()
+    for key, title, text in (
+        ("root", "Root displaced", _millimetres),
+        ("com", "Centre of mass displaced", _millimetres),
+        ("joints", "Joints turned", _degrees),
+    ):
+        change = repair[key]
+        what = f"{change['joint']}, " if change.get("joint") else ""
+        table.add_row(
+            title,
+            f"{text(change['rms'])} (RMS), up to {text(change['largest'])} "
+            f"({escape(what)}at {change['time']:.2f} s)",
+        )
+    if repair["stretch"] != 1.0:
+        table.add_row("Time stretched", f"by a factor of {repair['stretch']:g}")
+    table.add_section()
+    for rung in repair["rungs"]:
+        table.add_row(f"Step: {rung['name']}", escape(rung["text"]))
+    _add_notes(table, summary["notes"])
+    return table
+
+
+def _compared(repair: dict[str, Any], frames: int) -> Iterator[tuple[str, list[str]]]:
+    """What there was before and is after, of what is known."""
+    missing = repair["missing_before"], repair["missing"]
+    for title, key, unit in (
+        ("Residual force", "force_rms", "m g"),
+        ("Residual moment", "torque_rms", "m g m"),
+    ):
+        yield f"{title} (RMS)", [f"{_number(entry[key])} {unit}" for entry in missing]
+    counts = [entry["frames"] for entry in missing]
+    yield "Frames out of reach", [f"{count} ({count / frames:.1%})" for count in counts]
+    for title, key, unit in (
+        ("Contacts slide by up to", "largest_speed", "mm/s"),
+        ("Contacts drift by up to", "largest_drift", "mm"),
+    ):
+        values = [repair["stances"][f"{key}{ending}"] for ending in ("_before", "")]
+        yield title, [_millimetres(value, unit) for value in values]
+    if limits := repair["limits"]:
+        yield "Joints beyond limits by", [_degrees(limits[key]) for key in ("before", "after")]
+
+
+def _verdict_text(repair: dict[str, Any], ending: str) -> str:
+    verdict = repair[f"verdict{ending}"]
+    codes = [code for code in repair[f"codes{ending}"] if code != verdict]
+    text = f"[{VERDICT_COLORS[verdict]}]{verdict}[/]"
+    return f"{text} ({', '.join(codes)})" if codes else text
+
+
+def _millimetres(value: float | None, unit: str = "mm") -> str:
+    return "–" if value is None else f"{1e3 * value:.3g} {unit}"
+
+
+def _degrees(value: float | None) -> str:
+    return "–" if value is None else f"{math.degrees(value):.2g}°"
+
+
+def _add_notes(table: Table, notes: list[str]) -> None:
+    if notes:
+        table.add_section()
+    for note in notes:
+        table.add_row("Note", escape(note))
 
 
 def _percent(value: float | None) -> str:

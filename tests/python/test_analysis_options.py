@@ -16,6 +16,8 @@ from dynacom import (
     DetectionSettings,
     DynacomError,
     FaultLimit,
+    LadderSettings,
+    RepairSettings,
     VerdictSettings,
 )
 from dynacom.presets import PRESETS
@@ -57,6 +59,8 @@ def test_defaults(options):
     assert options.filter == CentroidalFilterSettings()
     assert options.detection == DetectionSettings()
     assert options.verdict == VerdictSettings()
+    assert options.repair == RepairSettings()
+    assert options.ladder == LadderSettings()
     options.validate()
     # Each has its own.
     options.detection.change = 3.0
@@ -70,6 +74,8 @@ cutoff: 8
 flat: false
 distance: false
 filter: {com: 0.02, window: 5}
+repair: {displacement: 0.02, feet: false}
+ladder: {rounds: 2, strict: true}
 detection: {change: 3, ground_height: -0.1, ground_velocity: [-1, 0.5, 0]}
 verdict:
   residual_force: {limit: 2e-1, allowed_share: 0.5}
@@ -90,7 +96,12 @@ verdict:
         "verdict.residual_force.allowed_share": 0.5,
         "verdict.foot_sliding.limit": 1.0,
         "verdict.cop_force": 0.08,
+        "repair.displacement": 0.02,
+        "repair.feet": False,
+        "ladder.rounds": 2,
+        "ladder.strict": True,
     }
+    assert type(options.ladder.rounds) is int
     assert options.verdict.residual_force == FaultLimit(0.2, 0.5)
     assert options.detection.ground_height == -0.1
     assert options.detection.ground_velocity.tolist() == [-1.0, 0.5, 0.0]
@@ -142,14 +153,21 @@ def test_every_setting_can_be_set_by_a_text():
     every = paths(AnalysisOptions().to_dict())
     costs = repr(CentroidalFilterSettings()).count("=")
     verdict = repr(dynacom.VerdictSettings()).count("=") + len(dynacom.describeFaults())
-    constants = len(every) - 2 - 5 - costs - verdict
+    repair = repr(RepairSettings()).count("=") + repr(LadderSettings()).count("=")
+    constants = len(every) - 2 - 5 - costs - verdict - repair
     assert constants == repr(DetectionSettings()).count("=") - 2 > 30
     for path in every:
         value, text = 0.51, "0.51"
         if path in ("flat", "distance"):
             value, text = False, "false"
-        elif path == "feet_only":
+        elif path in ("feet_only", "repair.pinned_ends", "ladder.strict"):
             value, text = True, "true"
+        elif path in ("repair.feet", "repair.joints"):
+            value, text = False, "false"
+        elif path == "ladder.rounds":
+            value, text = 5, "5"
+        elif path == "ladder.largest_stretch":
+            value, text = 1.5, "1.5"
         elif path.endswith("ground_velocity"):
             value, text = [1.0, -0.5, 0.0], "[1, -0.5, 0]"
         # What has a least must not be less than it, and the other way round.

@@ -16,6 +16,7 @@ import pytest
 
 import dynacom
 from dynacom import cli
+from dynacom.motion_joints import urdf_order
 from dynacom.summary import summary_table
 from helpers import WALKS, documented_columns, robots_folder
 from motion_files import sway, write_columns, write_csv
@@ -97,11 +98,27 @@ def test_help(command):
         *("--distance", "--no-distance", "--preset"),
     ):
         assert option in out
+    status, out, _ = command("repair", "--help")
+    assert status == 0
+    for option in (
+        *(
+            "--robot",
+            "--schedule",
+            "--set",
+            "--out",
+            "--csv",
+            "--page",
+            "--check",
+            "--balance-only",
+        ),
+        *("--strict", "--stretch", "--export-contacts"),
+    ):
+        assert option in out
 
 
 @pytest.mark.parametrize(
     "arguments",
-    [[], ["dance"], ["analyze"], ["show"], ["analyze", "m.npz", "--bogus"]],
+    [[], ["dance"], ["analyze"], ["repair"], ["show"], ["analyze", "m.npz", "--bogus"]],
 )
 def test_usage_errors(command, arguments):
     status, _, err = command(*arguments)
@@ -717,7 +734,7 @@ def test_an_interrupted_analysis_leaves_nothing(command, motion_file, tmp_path, 
     def interrupt(part):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "_progress", lambda: contextlib.nullcontext(interrupt))
+    monkeypatch.setattr(cli, "_progress", lambda title: contextlib.nullcontext(interrupt))
     out = tmp_path / "out"
     status, printed, err = command("analyze", motion_file(), "--robot", "talos", "--out", out)
     assert status not in (0, 1, 2)
@@ -831,3 +848,130 @@ def test_show(command, motion_file, monkeypatch):
     assert (status, err) == (0, "")
     assert shown == [("talos", 40, 40, 40, 1234)]
     assert "http://localhost:1234" in out
+
+
+# Repair.
+
+
+@pytest.fixture(scope="module")
+def hurried(tmp_path_factory, talos):
+    """The walk twice as fast, which contacts cannot give."""
+    path = tmp_path_factory.mktemp("hurried") / "walk.npz"
+    with np.load(WALK) as file:
+        np.savez(path, t=file["t"] / 2.0, q=file["q"])
+    return path
+
+
+def test_repair(command, hurried, talos, tmp_path):
+    """The command is dynacom.repair and save, and no more; it tells what was and what is."""
+    out = tmp_path / "out"
+    arguments = ("repair", hurried, "--robot", "talos", "--no-page", "--out", out)
+    status, printed, err = command(*arguments, "--check")
+    assert (status, err) == (0, "")
+    files = sorted([*FILES, "walk.npz"])
+    assert sorted(os.listdir(out)) == files
+    report = dynacom.repair(hurried, talos)
+    report.save(tmp_path / "expected", page=False)
+    for name in FILES:
+        assert (out / name).read_bytes() == (tmp_path / "expected" / name).read_bytes()
+        assert f"\nWrote {out / name}\n" in printed
+    found = summary(out)["repair"]
+    rows = dict(cells(printed))
+    assert rows["Repair"] == "repaired"
+    assert rows["Verdict"] == "repairable (residual_torque, cop_outside) → feasible"
+    assert rows["without the mark"] == "feasible"
+    assert rows["Frames out of reach"] == "271 (85.2%) → 0 (0.0%)"
+    root, joints = found["root"], found["joints"]
+    assert rows["Root displaced"] == (
+        f"{1e3 * root['rms']:.3g} mm (RMS), up to {1e3 * root['largest']:.3g} mm "
+        f"(at {root['time']:.2f} s)"
+    )
+    assert joints["joint"] in rows["Joints turned"] and "°" in rows["Joints turned"]
+    assert rows["Stances held still"] == "8 of 8"
+    steps = [name for name in rows if name.startswith("Step: ")]
+    assert steps == ["Step: balance", "Step: feet", "Step: joints"]
+    # Contacts, a page and a table, if they are asked for.
+    assert command(*arguments, "--export-contacts", "--csv")[0] == 0
+    assert sorted(os.listdir(out)) == sorted([*files, "contacts.npz", "frames.csv"])
+
+
+def test_what_was_repaired_is_analysed_to_the_same(command, hurried, tmp_path):
+    out = tmp_path / "out"
+    arguments = ("--robot", "talos", "--no-page", "--check", "--out")
+    assert command("repair", hurried, *arguments, out)[0] == 0
+    assert command("analyze", hurried, *arguments, tmp_path / "before")[0] == 1
+    assert command("analyze", out / "walk.npz", *arguments, tmp_path / "after")[0] == 0
+    assert summary(tmp_path / "after")["statuses"] == {"Solved": 318}
+
+
+def test_repair_has_a_folder_by_default(command, hurried, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, _, _ = command("repair", hurried, "--robot", "talos", "--no-page", "--balance-only")
+    assert status == 0
+    assert os.listdir() == ["walk-repaired"]
+    assert summary(tmp_path / "walk-repaired")["options"]["repair"]["feet"] is False
+    rungs = summary(tmp_path / "walk-repaired")["repair"]["rungs"]
+    assert [rung["name"] for rung in rungs] == ["balance"]
+
+
+def test_the_clip_is_not_overwritten(refuses, hurried):
+    before = hurried.read_bytes()
+    arguments = ("repair", hurried, "--robot", "talos", "--no-page", "--out", hurried.parent)
+    refuses(*arguments, parts=[hurried.parent, "another folder"])
+    assert hurried.read_bytes() == before
+    assert os.listdir(hurried.parent) == ["walk.npz"]
+
+
+def test_check_of_repairs(command, refuses, hurried, talos, talos_standing, tmp_path):
+    """A motion that is feasible, or was made so, passes; one that is repairable if that will do."""
+    trot = tmp_path / "trot.npz"
+    with np.load(WALKS / "anymal_trot.npz") as file:
+        np.savez(trot, t=file["t"] / 2.0, q=file["q"])
+    floating = tmp_path / "floating.npz"
+    q = np.tile(talos_standing, (100, 1))
+    time = np.arange(100) / 50.0
+    q[:, 2] += np.clip(4.0 * time * (2.0 - time), 0.0, 1.0)
+    np.savez(floating, t=time, q=q)
+    out = ("--no-page", "--out", tmp_path / "out")
+    for path, robot, feasible, repairable in (
+        (WALK, "talos", 0, 0),
+        (hurried, "talos", 0, 0),
+        (trot, "anymal_c", 1, 0),
+        (floating, "talos", 1, 1),
+    ):
+        arguments = ("repair", path, "--robot", robot, *out)
+        assert command(*arguments)[0] == 0
+        assert command(*arguments, "--check")[0] == feasible
+        assert command(*arguments, "--check", "repairable")[0] == repairable
+    status, printed, _ = command("repair", floating, "--robot", "talos", *out)
+    rows = dict(cells(printed))
+    assert rows["Repair"] == "not repaired"
+    assert summary(tmp_path / "out")["repair"]["reasons"]
+    for reason in summary(tmp_path / "out")["repair"]["reasons"]:
+        when = "" if reason["time"] is None else f" (at {reason['time']:.2f} s)"
+        assert rows[reason["code"]] == reason["text"] + when
+    assert command("repair", trot, "--robot", "anymal_c", *out, "--stretch", 1.5, "--check")[0] == 0
+    assert summary(tmp_path / "out")["repair"]["stretch"] > 1.0
+    arguments = ("repair", trot, "--robot", "anymal_c", *out)
+    refuses(*arguments, "--stretch", 0.5, parts=["largest_stretch must be finite and >= 1"])
+    refuses(*arguments, "--check=possible", parts=["check must be feasible or repairable"])
+
+
+def test_notes_of_what_was_written_are_printed(command, tmp_path):
+    """As that a file without times cannot say how fast it is now."""
+    robot = dynacom.load_robot("anymal_c")
+    path = tmp_path / "trot.csv"
+    with np.load(WALKS / "anymal_trot.npz") as file:
+        q = file["q"]
+    joints = [q[:, robot.model.joints[robot.model.getJointId(n)].idx_q] for n in urdf_order(robot)]
+    write_csv(path, np.column_stack([q[:, :7], *joints]))
+    arguments = ("--robot", "anymal_c", "--fps", 100, "--no-page", "--out", tmp_path / "out")
+    status, printed, _ = command("repair", path, *arguments, "--stretch", 1.5)
+    assert status == 0
+    stretch = summary(tmp_path / "out")["repair"]["stretch"]
+    note = f"its frame rate is {100 / stretch:.9g} Hz now (--fps)."
+    assert note in summary(tmp_path / "out")["notes"][-1]
+    assert " ".join(printed.replace("│", " ").split()).count(note) == 1
+    again = ("analyze", tmp_path / "out/trot.csv", "--robot", "anymal_c", "--no-page", "--check")
+    rate = ("--fps", 100 / stretch, "--out", tmp_path / "again")
+    assert command(*again, *rate)[0] == 0

@@ -23,6 +23,7 @@ def test_there_are_examples():
         "03_control_loop",
         "04_motion",
         "05_many_motions",
+        "06_repair",
     ]
 
 

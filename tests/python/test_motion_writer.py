@@ -842,6 +842,92 @@ def test_files_of_joblib(tmp_path, toy, compress):
 # Frames and joints that a file does not have.
 
 
+# At another pace.
+
+
+def test_stretched_times(tmp_path, toy, motion_file, talos):
+    """The first one stays; velocities in the file are those of the new pace."""
+    columns = sway(toy).columns
+    columns["t"] = 2.0 + columns["t"]
+    plain = motion_file(t=3.0 + np.arange(40) / 50.0, a=None)
+    paths = [(plain, talos), (write_columns(tmp_path / "motion.csv", columns), toy)]
+    table = pyarrow.table({name: pyarrow.array(column) for name, column in columns.items()})
+    paths.append((tmp_path / "motion.parquet", toy))
+    parquet.write_table(table, paths[-1][0])
+    for path, robot in paths:
+        clip = read_motion(path, robot)
+        out = path.with_name(f"out_{path.name}")
+        assert write_motion(clip, out, clip.q, stretch=1.25) == []
+        found = read_motion(out, robot)
+        assert_allclose(found.time, clip.time[0] + 1.25 * (clip.time - clip.time[0]), atol=1e-12)
+        assert_array_equal(found.q, clip.q)
+        if clip.v is not None:
+            assert_allclose(found.v, velocities(robot, found).v, atol=1e-12)
+            assert_allclose(velocities(robot, clip).v, 1.25 * found.v, atol=1e-12)
+
+
+def test_stretched_rates(tmp_path, toy):
+    """Those of integers stay such where they can; a note tells of arrays which cannot."""
+    path, out = tmp_path / "motion.pkl", tmp_path / "out.pkl"
+    rates = [(60, 1.5, int), (60, 1.25, int), (50, 1.1, float), (np.array([60]), 1.1, None)]
+    for fps, stretch, kind in rates:
+        clip = read_motion(dump(path, clip_of(toy, fps=fps)), toy)
+        assert write_motion(clip, out, clip.q, stretch=stretch) == []
+        found = pickle.loads(out.read_bytes())["fps"]
+        assert_allclose(found, fps / stretch)
+        if kind:
+            assert type(found) is kind
+        assert_allclose(read_motion(out, toy).time, stretch * clip.time, atol=1e-12)
+    clip = read_motion(tracking(tmp_path / "motion.npz", toy), toy)
+    notes = write_motion(clip, tmp_path / "out.npz", clip.q, stretch=1.25)
+    assert not any("fps" in note for note in notes)
+    notes = write_motion(clip, tmp_path / "odd.npz", clip.q, stretch=1.1)
+    assert "The array fps was of integers, and is of real numbers now." in notes
+    for name, stretch in (("out.npz", 1.25), ("odd.npz", 1.1)):
+        found = read_motion(tmp_path / name, toy)
+        assert_allclose(found.time, stretch * clip.time, atol=1e-12)
+        assert_array_equal(found.q, clip.q)
+        with np.load(tmp_path / name) as archive:
+            assert archive["fps"].shape == (1,)
+        assert_bodies(toy, found, tmp_path / name, LINKS, 1e-13)
+
+
+def test_rates_that_the_file_cannot_hold(tmp_path, toy):
+    path, out = write_csv(tmp_path / "motion.csv", sway(toy).table), tmp_path / "out.csv"
+    clip = read_motion(path, toy, fps=60)
+    notes = write_motion(clip, out, clip.q, stretch=1.25)
+    assert notes == [
+        "Time is stretched, and the file has no place to say so: its frame rate is 48 Hz now "
+        "(--fps)."
+    ]
+    assert out.read_bytes() == path.read_bytes()
+    # Who has given another rate than the file's has it in the file now.
+    path, out = dump(tmp_path / "motion.pkl", clip_of(toy)), tmp_path / "out.pkl"
+    clip = read_motion(path, toy, fps=100)
+    notes = write_motion(clip, out, clip.q, stretch=2.0)
+    assert notes == ["The frame rate is 50 Hz now, as the file says: --fps is not to be given."]
+    assert_allclose(read_motion(out, toy).time, 2.0 * clip.time, atol=1e-12)
+
+
+def test_forces_of_another_pace_are_left_out(tmp_path, toy):
+    path, out = tmp_path / "motion.csv", tmp_path / "out.csv"
+    path.write_bytes(LAYOUT.encode())
+    clip = read_motion(path, toy)
+    notes = write_motion(clip, out, clip.q, stretch=2.0)
+    assert "The forces of foot are left out: they were those of the motion before." in notes
+    found = read_motion(out, toy)
+    assert_allclose(found.time, [0.0, 0.08, 0.16, 0.24], atol=1e-12)
+    assert found.forces == {}
+
+
+@pytest.mark.parametrize("stretch", [0.0, -1.0, np.nan, np.inf])
+def test_stretches_that_are_none(motion_file, talos, tmp_path, stretch):
+    clip = read_motion(motion_file(), talos)
+    with pytest.raises(DynacomError, match="stretch must be finite and > 0, got"):
+        write_motion(clip, tmp_path / "out.npz", clip.q, stretch=stretch)
+    assert not (tmp_path / "out.npz").exists()
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
 def test_gaps(tmp_path, toy, suffix):
     """Frames that the file does not have are not written, and made anew when it is read."""

@@ -338,7 +338,7 @@ def test_the_section_on_repair(talos, repaired, tmp_path, monkeypatch):
     assert page.index('class="repair') < page.index('class="verdict')
     assert 'class="repair good"><h2>Repair: done</h2>' in text
     assert "is the ghost in the scene" in text
-    assert "Written to mended.csv, exactly" in text
+    assert "Written to mended.csv, marked as exact" in text
     assert REPAIR["sha256"] in text
     for title, *cells in (
         ("Verdict", "not feasible|cop_outside, residual_torque|", "feasible"),
@@ -370,7 +370,7 @@ def test_what_could_not_be_mended(talos, repaired, tmp_path, monkeypatch):
     report = (q, arrays, summary | {"repair": failed})
     text = section(written(tmp_path / "report.html", talos, report, before))
     assert 'class="repair bad"><h2>Repair: not done</h2>' in text
-    assert "Written to mended.csv, rounded" in text
+    assert "Written to mended.csv, without a mark" in text
     (button,) = row(text, "<code>contact_needed</code> Nothing touches.")
     assert 'data-time="1.2"' in button
 

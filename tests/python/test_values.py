@@ -4,6 +4,7 @@
 import copy
 import pickle
 import re
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -51,6 +52,10 @@ def objects(talos, talos_standing, talos_motion):
     repaired = dynacom.repairMotion(
         dynacom.splitContacts(robot), motion, examination.inference.schedule
     )
+    few = dynacom.RecordedMotion(motion.time[:4], np.tile(talos_standing, (4, 1)))
+    repairer = dynacom.make_repairer(talos, dynacom.AnalysisOptions())
+    hurried = replace(report.clip, time=report.clip.time / 1.5, v=None, a=None)
+    mended = dynacom.repair(hurried, talos, strict=True)
     objects = [
         state,
         dynacom.computeGroundWrench(state, [0.0, 0.0, -9.81]),
@@ -78,6 +83,14 @@ def objects(talos, talos_standing, talos_motion):
         dynacom.CentroidalFilterSettings(),
         examination.distance,
         dynacom.RepairSettings(),
+        dynacom.LadderSettings(),
+        repairer,
+        mended,
+        mended.repair,
+        mended.repair.root,
+        mended.repair.steps[0],
+        repairer.repair(few).reasons[0],
+        dynacom.RepairGround(),
         repaired,
         repaired.stances[0],
         dynacom.FaultLimit(0.1, 0.2),
@@ -187,8 +200,8 @@ def test_what_printing_tells(objects):
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
 def test_everything_can_be_copied(objects, copied):
     for name, value in objects.items():
-        # They hold a pinocchio.Model, which says itself how it is copied.
-        if name in ("Robot", "MotionReport"):
+        # They hold a pinocchio.Model, which says itself how it is copied; nor is a MotionRepairer.
+        if name in ("Robot", "MotionReport", "RepairReport", "MotionRepairer"):
             continue
         other = copied(value)
         assert type(other) is type(value), name
