@@ -26,7 +26,7 @@ def main():
         folder,
         "g1",
         out,
-        # Repair asks for the distance, which analysis can do without.
+        # By the distance repair chooses contacts; analysis can do without.
         options=dynacom.AnalysisOptions(distance=repairs),
         engine=engine,
         jobs=int(jobs),

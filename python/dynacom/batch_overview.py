@@ -31,7 +31,7 @@ _COLUMNS = (
 # A folder's ground is worth a word if it has so many clips, if theirs lie no farther apart than
 # this [m], and none nearer to zero.
 _GROUND_CLIPS = 3
-_GROUND_SPREAD = 0.01
+_GROUND_SPREAD = 0.02
 _GROUND_HEIGHT = 0.01
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """Worker processes that judge clips, and that may die.
 
-A clip whose worker dies is tried once more, in another; if that one dies, too, the clip has an
-error, and the others go on.
+A clip whose worker dies is tried once more, in another, and then, if it is to be repaired, without
+that; if all of them die, the clip has an error, and the others go on.
 """
 
 import os
@@ -98,8 +98,11 @@ class Pool:
                 deaths[first.index] += 1
                 if deaths[first.index] == 1:
                     again.appendleft(first)
+                elif first.place is not None:
+                    again.appendleft(first._replace(place=None))
                 else:
-                    message = f"{first.name}: its worker process died twice ({how})"
+                    times = {2: "twice", 3: "three times"}[deaths[first.index]]
+                    message = f"{first.name}: its worker process died {times} ({how})"
                     yield Done(first.index, [error_row(self._job, first.name, message)])
 
     def close(self) -> None:

@@ -79,18 +79,14 @@ class RepairedFile:
     """
 
     def __init__(self, folder: Path, place: str, source: Path, pickle: PickleFile | None) -> None:
-        """Takes away what was made of the file before, and writes nothing yet.
+        """Writes nothing yet.
 
         Args:
             folder: of all repaired motions.
             place: the file's in it, a relative path.
             source: the file that is read.
             pickle: the same, if it may hold several clips.
-
-        Raises:
-            WritingError: the folder cannot be written to.
         """
-        remove_repaired(folder, place)
         self._folder = folder
         self._place = place
         self._source = source

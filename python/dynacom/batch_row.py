@@ -275,7 +275,8 @@ class Judge:
             name: the file's in results.
             file: a path or a URL.
             known: the SHA-256 of a file of which the rows are known already.
-            place: where it lies among the repaired motions, a relative path.
+            place: where it lies among the repaired motions, a relative path; None where it is not
+                repaired: in a job that repairs, because that kills workers.
 
         Returns:
             The rows, or None if that is this file.
@@ -293,9 +294,13 @@ class Judge:
                     digest = _digest(opened)
                 if digest == known:
                     return None
-                pickle = self._open(path)
                 repaired = None
-                if self._job.repair is not None:
+                if place is not None:
+                    remove_repaired(self._job.repair, place)
+                elif self._job.repair is not None:
+                    digest = None  # going on tries it again
+                pickle = self._open(path)
+                if place is not None:
                     repaired = RepairedFile(self._job.repair, place, path, pickle)
                 for clip, read in self._clips(path, pickle):
                     found = self._judge(name, clip, path, read, repaired)
@@ -307,7 +312,7 @@ class Judge:
         except WritingError:
             raise
         except Exception as error:  # whatever the file made any library raise
-            if self._job.repair is not None:
+            if place is not None:
                 remove_repaired(self._job.repair, place)
             message = _message(error, name, path)
             rows.append(
@@ -344,7 +349,7 @@ class Judge:
         frames = None if job.frames is None else _frames_file(job.frames, job.robot, name, title)
         try:
             with np.errstate(all="ignore"):
-                report, made = self._examine(read())
+                report, made = self._examine(read(), repaired is not None)
             row = _report_row(report, name)
         except Exception as error:
             if frames is not None:
@@ -357,16 +362,20 @@ class Judge:
             _write_frames(report, name, title, frames, job.frames)
         if repaired is not None:
             row |= _repair_columns(repaired, clip, made, lambda e: _message(e, name, path))
+        elif job.repair is not None:
+            row["repair_error"] = f"{name}: its worker process died twice"
         return row | {"clip": title}
 
-    def _examine(self, clip: Clip) -> tuple[MotionReport, RepairReport | Exception | None]:
+    def _examine(
+        self, clip: Clip, with_repair: bool
+    ) -> tuple[MotionReport, RepairReport | Exception | None]:
         """What is found of a clip, and, where that is asked for, its repair, or why there is none.
 
         Raises:
             DynacomError: as :func:`examine`.
         """
         job, error = self._job, None
-        if self._repairer is not None:
+        if with_repair:
             try:
                 made = repair_clip(clip, job.robot, job.options, self._repairer)
                 return made.before, made

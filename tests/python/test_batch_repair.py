@@ -319,6 +319,28 @@ def test_an_error_of_repair_keeps_the_analysis(tmp_path, judge, monkeypatch):
     assert not tree(tmp_path)
 
 
+def test_repair_that_kills_workers(tmp_path, anymal):
+    """Without it, there is a row of the analysis."""
+    log = tmp_path / "log"
+    log.touch()
+    kill = f"import os; f = open({str(log)!r}, 'r+'); n = len(f.read()); f.write('x'); f.flush()"
+    write_program(tmp_path / "m.pkl", anymal, 0, f"{kill}; n > 1 or os._exit(1)")
+    (row,) = repair(tmp_path / "m.pkl", tmp_path / "out", trust=True).to_pylist()
+    assert (row["status"], row["verdict"], row["repair"]) == ("ok", "feasible", None)
+    assert row["repair_error"] == f"{tmp_path}/m.pkl: its worker process died twice"
+    # There may be more memory now.
+    (row,) = repair(tmp_path / "m.pkl", tmp_path / "out", trust=True, resume=True).to_pylist()
+    assert (row["repair"], row["repair_error"]) == ("feasible", None)
+    assert set(tree(tmp_path / "out")) == {"m.pkl"}
+
+    log.write_text("")
+    write_program(tmp_path / "m.pkl", anymal, 0, f"{kill}; os._exit(1)")
+    (row,) = repair(tmp_path / "m.pkl", tmp_path / "out", trust=True, resume=True).to_pylist()
+    assert row["error"].endswith("its worker process died three times (exit status 1)")
+    assert row["repair_error"] is None
+    assert (row["repair_file"], tree(tmp_path / "out")) == (None, {})
+
+
 @pytest.mark.parametrize("what", ["motion_content", "PickleFile.dump", "PickleFile.change"])
 def test_what_a_format_cannot_hold(tmp_path, judge, anymal, monkeypatch, what):
     name = "m.npz" if what == "motion_content" else "m.pkl"
