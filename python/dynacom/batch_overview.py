@@ -186,14 +186,14 @@ def _judged(
 
 
 def _count_repair(row: Row, found: Overview, listed: int) -> None:
-    if row["repair"] is not None:
-        found.outcomes[row["repair"]] += 1
-    if row["repair_reasons"] is not None:
-        found.repair_codes.update(row["repair_reasons"].split("+"))
     if row["repair_error"] is not None:
         found.repair_errors += 1
         if len(found.repair_failed) < listed:
             found.repair_failed.append(row)
+    elif row["repair"] is not None:
+        found.outcomes[row["repair"]] += 1
+        if row["repair_reasons"] is not None:
+            found.repair_codes.update(row["repair_reasons"].split("+"))
 
 
 def _badness(row: Row) -> tuple[int, float, float]:

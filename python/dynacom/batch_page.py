@@ -212,7 +212,7 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
 
 
 def _repair_cells(row: Row) -> str:
-    outcome = row["repair"] or "failed"
+    outcome = row["repair"] if row["repair_error"] is None else "failed"
     if row["repair_reasons"]:
         outcome += f": {row['repair_reasons'].replace('+', ', ')}"
     return f"<td>{escape(outcome)}</td>{_number(_millimetres(row['repair_root_max']))}"

@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from dynacom.batch_files import printable
+from dynacom.dynacom_pywrap import MotionExaminer
 from dynacom.errors import DynacomError
-from dynacom.motion_file import suffix_of
+from dynacom.motion_file import Clip, suffix_of
 from dynacom.motion_mark import mark_of
 from dynacom.motion_pickle import PickleFile
 from dynacom.motion_report import FAULTS, TOO_SHORT
 from dynacom.motion_writer import motion_content
-from dynacom.repair import RepairReport
+from dynacom.repair import RepairReport, different_text
 
 #: Column's name, Arrow's type, unit. docs/batch.md says what they are.
 REPAIR_COLUMNS = (
@@ -78,7 +79,14 @@ class RepairedFile:
     are none, there is no file.
     """
 
-    def __init__(self, folder: Path, place: str, source: Path, pickle: PickleFile | None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        place: str,
+        source: Path,
+        pickle: PickleFile | None,
+        examiner: MotionExaminer,
+    ) -> None:
         """Writes nothing yet.
 
         Args:
@@ -86,12 +94,16 @@ class RepairedFile:
             place: the file's in it, a relative path.
             source: the file that is read.
             pickle: the same, if it may hold several clips.
+            examiner: of what is written: without a filter.
         """
         self._folder = folder
         self._place = place
         self._source = source
         self._pickle = pickle
+        self._examiner = examiner
         self._kept = 0
+        #: What is still to be examined once it is written.
+        self._unchecked: RepairReport | None = None
         #: The file's bytes, if they are not those that it had.
         self._content: Callable[[], bytes] = source.read_bytes
         self._is_exact = False
@@ -112,7 +124,7 @@ class RepairedFile:
             Whether the file will hold it.
 
         Raises:
-            DynacomError: the file's format cannot hold what was made of it: it will not.
+            DynacomError: the file's format cannot hold what was made of it, so it will not.
         """
         is_kept = report is not None and report.outcome != "not repaired"
         try:
@@ -135,7 +147,7 @@ class RepairedFile:
 
         Raises:
             WritingError: the folder cannot be written to.
-            DynacomError: the file holds what cannot be written.
+            DynacomError: the file holds what cannot be written, or is not feasible as it was.
         """
         if not self._kept:
             return
@@ -148,6 +160,8 @@ class RepairedFile:
                     parent.mkdir(parents=True, exist_ok=True)
                 written = temporary / path.name
                 _write(written, content)
+                if self._unchecked is not None:
+                    self._check(self._unchecked, self._unchecked.read_again(written))
                 # The mark first: who finds the file finds that, too.
                 if self._is_exact and suffix_of(path) in _UNMARKED:
                     text = json.dumps({"repair": mark_of(written)})
@@ -162,9 +176,22 @@ class RepairedFile:
         if self._pickle is None:
             content = motion_content(change)
             self._content = lambda: content
+            self._unchecked = report
         else:
             self._pickle.change(change)
             self._content = self._pickle.dump
+            clip = report.clip
+            self._check(report, self._pickle.read(clip.options.clip, clip.robot))
+
+    def _check(self, report: RepairReport, written: Clip) -> None:
+        """A file may not have all joints of the robot, and has its numbers rounded.
+
+        Raises:
+            DynacomError: the motion is not feasible as it was written.
+        """
+        found = report.examine_written(written, self._examiner)
+        if found.verdict.outcome != "feasible":
+            raise DynacomError(f"{self._source}: {different_text(found)}")
 
     def _read(self) -> bytes:
         try:

@@ -10,7 +10,7 @@ import time
 import urllib.parse
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -262,9 +262,11 @@ class Judge:
         self._reading = Options(job.fps, job.quat, job.trust)
         # One thread: there are other processes.
         self._examiner = make_examiner(job.robot, job.options, sensitivity=False, threads=1)
-        self._repairer = None
         if job.repair is not None:
             self._repairer = make_repairer(job.robot, job.options, threads=1)
+            # Of what is written, which is exact.
+            options = replace(job.options, cutoff=None)
+            self._unfiltered = make_examiner(job.robot, options, sensitivity=False, threads=1)
 
     def __call__(
         self, name: str, file: str, known: str | None, place: str | None = None
@@ -301,7 +303,7 @@ class Judge:
                     digest = None  # going on tries it again
                 pickle = self._open(path)
                 if place is not None:
-                    repaired = RepairedFile(self._job.repair, place, path, pickle)
+                    repaired = RepairedFile(self._job.repair, place, path, pickle, self._unfiltered)
                 for clip, read in self._clips(path, pickle):
                     found = self._judge(name, clip, path, read, repaired)
                     rows.append(found | {"sha256": digest, "seconds": time.perf_counter() - start})

@@ -100,17 +100,22 @@ class PickleFile:
             chosen = replace(self._options, clip=str(key))
             yield str(key), partial(_read, self._path, clip, robot, chosen)
 
+    def read(self, name: str | None, robot: Robot) -> Clip:
+        """A clip, as it is now.
+
+        Raises:
+            DynacomError: as :func:`read_pickle`.
+        """
+        chosen = replace(self._options, clip=name)
+        return _read(self._path, self._find(name), robot, chosen)
+
     def change(self, change: Change) -> None:
         """Changes one of the clips, here and not on the disk.
 
         Raises:
             DynacomError: as :func:`write_motion`.
         """
-        name, options = change.clip.options.clip, self._options
-        if name in self._keys:
-            clip = self._content[self._keys[name]]
-        else:
-            clip = _choose(self._path, self._content, name)
+        clip, options = self._find(change.clip.options.clip), self._options
         if change.moves:
             layout = _find_layout(self._path, clip, change.clip.robot, options)
             _change_clip(change, clip, layout)
@@ -130,6 +135,11 @@ class PickleFile:
             OSError: the file cannot be read.
         """
         return _dump(self._path, self._content)
+
+    def _find(self, name: str | None) -> dict[str, Any]:
+        if name in self._keys:
+            return self._content[self._keys[name]]
+        return _choose(self._path, self._content, name)
 
 
 def _read(path: Path, content: Mapping[str, Any], robot: Robot, options: Options) -> Clip:

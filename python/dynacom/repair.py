@@ -13,13 +13,26 @@ import numpy as np
 
 from dynacom.analysis_options import AnalysisOptions
 from dynacom.contacts_file import write_contacts
-from dynacom.dynacom_pywrap import ContactSchedule, Motion, MotionRepair, MotionRepairer
+from dynacom.dynacom_pywrap import (
+    ContactSchedule,
+    Motion,
+    MotionExaminer,
+    MotionRepair,
+    MotionRepairer,
+)
 from dynacom.errors import DynacomError
 from dynacom.motion_change import Change
 from dynacom.motion_clip import is_point
 from dynacom.motion_file import Clip, read_motion
 from dynacom.motion_mark import mark_of
-from dynacom.motion_report import FILES, MotionReport, make_examiner, make_recorded, without_nan
+from dynacom.motion_report import (
+    FILES,
+    MotionReport,
+    examine,
+    make_examiner,
+    make_recorded,
+    without_nan,
+)
 from dynacom.motion_writer import write_motion
 from dynacom.repair_change import Before
 from dynacom.repair_summary import repair_summary
@@ -71,17 +84,22 @@ class RepairReport:
             path: the file to write, with the suffix of the clip's.
 
         Returns:
-            What marks it, which is to be written beside it for CSV, see :func:`mark_of`, with
-            ``exact`` False for what is not marked; and notes, see :func:`write_motion`.
+            What is to be said of the file in the summary: what marks it, which is to be written
+            beside it for CSV, see :func:`mark_of`, with ``exact`` False for what is not marked; and
+            its ``verdict_written`` and ``codes_written``, once it has been read again. And notes,
+            see :func:`write_motion`.
 
         Raises:
             DynacomError: as :func:`write_motion`.
         """
         if not self.changed:
             _copy(self.clip.path, Path(path))
-            return mark_of(path) | {"exact": self.clip.exact}, []
+            return mark_of(path) | {"exact": self.clip.exact} | _written(self.after), []
         notes = write_motion(self.clip, path, **self._arguments())
-        return mark_of(path), notes
+        written = self.examine_written(self.read_again(path))
+        if written.verdict.outcome != self.after.verdict.outcome:
+            notes.append(different_text(written))
+        return mark_of(path) | _written(written), notes
 
     def change(self) -> Change:
         """What of the clip's file is another thing now, for whoever writes several clips at once.
@@ -90,6 +108,33 @@ class RepairReport:
             DynacomError: as :func:`write_motion`.
         """
         return Change.of(self.clip, mark=True, **self._arguments())
+
+    def read_again(self, path: str | Path) -> Clip:
+        """The motion as it was written.
+
+        Raises:
+            DynacomError: as :func:`read_motion`.
+        """
+        how = self.clip.options
+        return read_motion(
+            path,
+            self.robot,
+            fps=None if how.fps is None else how.fps / self.repair.stretch,
+            quat=how.quat,
+            trust=how.trust,
+            clip=how.clip,
+        )
+
+    def examine_written(self, clip: Clip, examiner: MotionExaminer | None = None) -> MotionReport:
+        """What is found of the motion as it was written.
+
+        Args:
+            clip: what was read of it.
+            examiner: of the robot, and of options without a cut-off.
+        """
+        options = replace(self.options, cutoff=None)
+        examiner = examiner or make_examiner(self.robot, options, sensitivity=False)
+        return examine(clip, self.robot, options, examiner, self.repair.recorded.schedule)
 
     def _arguments(self) -> dict[str, Any]:
         """Of :func:`write_motion`."""
@@ -250,6 +295,19 @@ def repair_clip(
         )
         after = MotionReport(repaired, robot, options, found.after, schedule_text)
     return RepairReport(clip, robot, options, found, before, after)
+
+
+def different_text(written: MotionReport) -> str:
+    """What is to be said of a motion whose verdict is another one as it was written."""
+    return (
+        f"The motion is {written.verdict.outcome} ({', '.join(written.verdict.codes)}) as it was "
+        "written: its file cannot hold all that was changed."
+    )
+
+
+def _written(report: MotionReport) -> dict[str, Any]:
+    verdict = report.verdict
+    return {"verdict_written": verdict.outcome, "codes_written": verdict.codes}
 
 
 def _copy(source: Path, path: Path) -> None:

@@ -147,7 +147,7 @@ def _rung_texts(step: RepairStep, before: MotionExamination) -> Iterator[str]:
     elif step.rung == "feet":
         yield (
             "Contacts were held still and level with their ground: they slide by up to "
-            f"{1e3 * step.after:.3g} mm/s, and did by {1e3 * step.before:.3g} mm/s."
+            f"{step.after:.3g} m/s, and did by {step.before:.3g} m/s."
         )
     elif step.rung == "joints":
         yield (

@@ -85,7 +85,7 @@ _OUTCOME_COLORS = {"feasible": "green", "repaired": "green", "not repaired": "re
 
 
 def repair_table(summary: dict[str, Any]) -> Table:
-    """The summary of a :class:`RepairReport`, as a table of two columns: before → after."""
+    """What summary.json holds of a :class:`RepairReport`, as a table: before → after."""
     repair = summary["repair"]
     table = Table(show_header=False)
     table.add_column(style="bold", overflow="fold")
@@ -100,6 +100,7 @@ def repair_table(summary: dict[str, Any]) -> Table:
     verdicts = [_verdict_text(repair, ending) for ending in ("_before", "")]
     table.add_row("Verdict", " → ".join(verdicts))
     table.add_row("  without the mark", _verdict_text(repair, "_filtered"))
+    table.add_row("  as it was written", _verdict_text(repair, "_written"))
     for title, texts in _compared(repair, summary["frames"]):
         table.add_row(title, " → ".join(texts))
     stances = repair["stances"]
@@ -155,7 +156,10 @@ def _verdict_text(repair: dict[str, Any], ending: str) -> str:
 
 
 def _millimetres(value: float | None, unit: str = "mm") -> str:
-    return "–" if value is None else f"{1e3 * value:.3g} {unit}"
+    if value is None:
+        return "–"
+    digits = ".3g" if abs(value) < 1.0 else ".0f"
+    return f"{1e3 * value:{digits}} {unit}"
 
 
 def _degrees(value: float | None) -> str:

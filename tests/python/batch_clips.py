@@ -4,6 +4,7 @@
 import gzip
 import os
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pyarrow
 
 from dynacom.robots import Robot
 from helpers import WALKS
+from motion_files import columns_of, write_columns
 
 #: Contents of broken files by name -> a part of the error.
 BROKEN = {
@@ -52,15 +54,32 @@ def hurry(path: Path, start: int, frames: int) -> Path:
     return cut(path, start, frames, "anymal_trot", t=time, v=None, a=None)
 
 
+def write_without_legs(path: Path, talos: Robot) -> Robot:
+    """A file without the legs, which repair has to move: feet slide without them.
+
+    Returns:
+        The robot, whose legs are by default where the file needs them.
+    """
+    with np.load(WALKS / "talos_walk.npz") as file:
+        still = np.tile(file["q"][0], (100, 1))
+    columns = {
+        name: values
+        for name, values in columns_of(talos, still).items()
+        if not name.startswith("leg_")
+    }
+    columns = {"t": np.arange(100) / 50.0} | columns
+    # The trunk turns faster than soles allow.
+    columns["torso_1_joint"] = 0.6 * np.sin(2.0 * np.pi * 1.5 * np.arange(100) / 50.0)
+    columns["arm_left_2_joint"] = 0.8 + 0.5 * np.sin(2.0 * np.pi * 2.5 * np.arange(100) / 50.0)
+    write_columns(path, columns)
+    return replace(talos, default=still[0])
+
+
 def write_csv(path: Path, robot: Robot, walk: str, rate: float) -> Path:
     """A piece of a bundled walk at so many frames a second; 50 are its own."""
     with np.load(WALKS / f"{walk}.npz") as file:
         q = file["q"][40:80]
-    names = ["t", *(f"root_{name}" for name in ("x", "y", "z", "qx", "qy", "qz", "qw"))]
-    table = np.column_stack([np.arange(len(q)) / rate, q])
-    header = ",".join([*names, *robot.joints.names])
-    np.savetxt(path, table, delimiter=",", fmt="%.9f", header=header, comments="")
-    return path
+    return write_columns(path, {"t": np.arange(len(q)) / rate} | columns_of(robot, q))
 
 
 def write_repairable(folder: Path, robot: Robot) -> dict[str, str]:

@@ -17,7 +17,17 @@ import pyarrow.parquet
 import pytest
 
 import dynacom
-from batch_clips import cut, hover, hurry, motion, same, write_csv, write_program, write_repairable
+from batch_clips import (
+    cut,
+    hover,
+    hurry,
+    motion,
+    same,
+    write_csv,
+    write_program,
+    write_repairable,
+    write_without_legs,
+)
 from dynacom import DynacomError, batch_row
 from dynacom.batch_files import find_motions, find_places
 from dynacom.batch_overview import overview
@@ -361,6 +371,36 @@ def test_what_a_format_cannot_hold(tmp_path, judge, anymal, monkeypatch, what):
         assert other.get("repair_file") == ("repaired/m.pkl" if is_there else None)
     if is_there:
         assert list(pickle.loads((tmp_path / "repaired" / "m.pkl").read_bytes())) == ["calm"]
+
+
+@pytest.mark.parametrize("kind", ["csv", "pkl"])
+def test_what_is_not_feasible_as_it_was_written(tmp_path, talos, kind):
+    """What repair has moved is not in the file: it is not written."""
+    path = tmp_path / "walk.csv"
+    robot = write_without_legs(path, talos)
+    if kind == "pkl":
+        clip = dynacom.read_motion(path, robot)
+        names = list(clip.joint_names)
+        columns = [robot.model.joints[robot.model.getJointId(name)].idx_q for name in names]
+        parts = {
+            "root_pos": clip.q[:, :3],
+            "root_rot": clip.q[:, 3:7],
+            "dof_pos": clip.q[:, columns],
+        }
+        clips = {name: parts | {"fps": 50.0, "dof_names": names} for name in ("one", "two")}
+        path = tmp_path / "walk.pkl"
+        path.write_bytes(pickle.dumps(clips))
+    table = repair(path, tmp_path / "out", robot=robot)
+    for row in table.to_pylist():
+        assert (row["repair"], row["repair_file"]) == ("repaired", None)
+        assert re.fullmatch(
+            rf"{path}: The motion is repairable \(foot_sliding\) as it was written: .*",
+            row["repair_error"],
+        )
+    assert not tree(tmp_path / "out")
+    found = overview(tmp_path / "out" / "clips.parquet")
+    assert (found.outcomes["repaired"], found.repair_errors) == (0, table.num_rows)
+    assert "cannot hold all that was changed" in (tmp_path / "out" / "index.html").read_text()
 
 
 def test_a_folder_that_cannot_be_written_to(tmp_path):

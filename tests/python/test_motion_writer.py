@@ -892,6 +892,25 @@ def test_stretched_rates(tmp_path, toy):
         assert_bodies(toy, found, tmp_path / name, LINKS, 1e-13)
 
 
+def test_velocities_in_the_file_are_slower(tmp_path, toy):
+    """They are known for what they are by the pace that the file had."""
+    motion = sway(toy)
+    columns = [toy.model.joints[toy.model.getJointId(name)].idx_v for name in motion.names]
+    v = dynacom.differentiate(toy.model, motion.time, motion.q).v[:, columns]
+    clip = read_motion(dump(tmp_path / "motion.pkl", clip_of(toy, dof_vel=v)), toy)
+    assert write_motion(clip, tmp_path / "out.pkl", clip.q, stretch=2.0) == []
+    found = pickle.loads((tmp_path / "out.pkl").read_bytes())["dof_vel"]
+    assert_allclose(found, 0.5 * v, atol=1e-5)
+    # Of bodies, those that a first writing has made so.
+    clip = read_motion(tracking(tmp_path / "motion.npz", toy), toy)
+    write_motion(clip, tmp_path / "origins.npz", moved(toy, clip))
+    clip = read_motion(tmp_path / "origins.npz", toy)
+    assert write_motion(clip, tmp_path / "slow.npz", clip.q, stretch=2.0) == []
+    with np.load(tmp_path / "origins.npz") as before, np.load(tmp_path / "slow.npz") as after:
+        for name in ("body_lin_vel_w", "body_ang_vel_w", "joint_vel"):
+            assert_allclose(after[name], 0.5 * before[name], atol=1e-9)
+
+
 def test_rates_that_the_file_cannot_hold(tmp_path, toy):
     path, out = write_csv(tmp_path / "motion.csv", sway(toy).table), tmp_path / "out.csv"
     clip = read_motion(path, toy, fps=60)

@@ -13,20 +13,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import dynacom
+from batch_clips import write_without_legs
 from dynacom import AnalysisOptions, DynacomError, LadderSettings, RepairReport
 from dynacom.contacts_file import contact_arrays
 from dynacom.robots import Robot
 from helpers import WALKS
-from motion_files import ROOT
+from motion_files import columns_of
 
 BY_DEFAULT = ["frames.parquet", "schedule.yaml", "summary.json"]
-
-
-def columns_of(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
-    """The columns of CSV with a header."""
-    model = robot.model
-    joints = {name: q[:, model.joints[model.getJointId(name)].idx_q] for name in robot.joints.names}
-    return dict(zip(ROOT, q[:, :7].T, strict=True)) | joints
 
 
 def write_walk(path: Path, robot: Robot, factor: float, frames: slice = slice(None)) -> Path:
@@ -150,7 +144,9 @@ def test_the_summary(hurried):
     # Before it is written nobody knows the file; all else is the same.
     unwritten = report.summary["repair"]
     assert {key: value for key, value in repair.items() if key in unwritten} == unwritten
-    assert set(repair) - set(unwritten) == {"file", "sha256", "exact"}
+    written = {"verdict_written", "codes_written"}
+    assert set(repair) - set(unwritten) == {"file", "sha256", "exact"} | written
+    assert (repair["verdict_written"], repair["codes_written"]) == ("feasible", ["feasible"])
 
 
 def test_contacts_for_training(talos, hurried):
@@ -389,6 +385,22 @@ def test_settings_out_of_range(name, value):
         options.validate()
 
 
+def test_the_manual_is_true(root, tmp_path, monkeypatch, capsys):
+    """Its Python runs, and its settings are those that there are, with their defaults."""
+    text = (root / "docs" / "repair.md").read_text(encoding="utf-8")
+    (tmp_path / "examples").symlink_to(root / "examples")
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S)
+    exec(compile(code, "repair.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "repairable -> feasible repaired" in printed
+    assert "{'Solved': 318}" in printed
+    defaults = AnalysisOptions().to_dict()
+    for group in ("repair", "ladder"):
+        rows = dict(re.findall(rf"^\| `{group}\.(\w+)` \| (\S+) \|", text, re.M))
+        assert {name: json.loads(value) for name, value in rows.items()} == defaults[group]
+
+
 # Files.
 
 
@@ -444,8 +456,46 @@ def test_forces_in_the_file_are_those_of_the_new_motion(talos, tmp_path):
     report.save(tmp_path / "out", page=False)
     again = dynacom.analyze(tmp_path / "out/walk.npz", talos)
     assert again.verdict.outcome == "feasible"
+    assert_array_equal(again.clip.schedule.active, report.after.schedule.active)
+    assert [*again.summary["measured"]] == ["left_sole", "right_sole"]
     for name, compared in again.summary["measured"].items():
         assert_allclose(compared["rms"], 0.0, atol=1e-6, err_msg=name)
+
+
+def test_what_the_file_cannot_hold_is_told(talos, tmp_path):
+    path = tmp_path / "walk.csv"
+    robot = write_without_legs(path, talos)
+    report = dynacom.repair(path, robot, fps=50.0)
+    assert report.outcome == "repaired"
+    report.save(tmp_path / "out", page=False)
+    summary = json.loads((tmp_path / "out/summary.json").read_text())
+    again = dynacom.analyze(tmp_path / "out/walk.csv", robot, fps=50.0)
+    assert again.verdict.outcome == "repairable"
+    assert summary["repair"]["verdict"] == "feasible"
+    assert summary["repair"]["verdict_written"] == again.verdict.outcome
+    assert summary["repair"]["codes_written"] == again.verdict.codes
+    assert summary["notes"][-1] == (
+        f"The motion is repairable ({', '.join(again.verdict.codes)}) as it was written: its file "
+        "cannot hold all that was changed."
+    )
+
+
+def test_who_says_when_contacts_carry(talos, tmp_path):
+    """The caller, and then the file does."""
+    with np.load(WALKS / "talos_walk.npz") as file:
+        arrays = {name: file[name] for name in ("t", "q", "contacts", "contact_names")}
+    arrays["t"] = arrays["t"] / 2.0
+    np.savez(tmp_path / "walk.npz", **arrays)
+    active = arrays["contacts"].copy()
+    active[100:110] = True
+    schedule = dynacom.ContactSchedule(["left_sole", "right_sole"], active)
+    assert not np.array_equal(active, arrays["contacts"])
+    report = dynacom.repair(tmp_path / "walk.npz", talos, schedule=schedule)
+    assert report.changed
+    report.save(tmp_path / "out", page=False)
+    assert_array_equal(
+        dynacom.read_motion(tmp_path / "out/walk.npz", talos).schedule.active, active
+    )
 
 
 def test_the_page_shows_what_was_before(hurried, tmp_path):
