@@ -697,9 +697,7 @@ def test_lists_of_the_index_are_short(walks, tmp_path):
 def test_reports_of_the_worst(walks, tmp_path, monkeypatch, anymal):
     # What a page looks like is tested elsewhere.
     page = types.ModuleType("dynacom.page")
-    page.write_page = lambda path, robot, q, arrays, summary, **others: path.write_text(
-        summary["clip"]
-    )
+    page.write_page = lambda path, *others, before: path.write_text(others[-1]["clip"])
     monkeypatch.setitem(sys.modules, "dynacom.page", page)
     hover(walks / 'a"b.npz', 0, 40)
     hover(walks / "b.npz", 20, 40)

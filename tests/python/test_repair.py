@@ -386,7 +386,7 @@ def test_settings_out_of_range(name, value):
 
 
 def test_the_manual_is_true(root, tmp_path, monkeypatch, capsys):
-    """Its Python runs, and its settings are those that there are, with their defaults."""
+    """Its Python runs, and prints what one would expect."""
     text = (root / "docs" / "repair.md").read_text(encoding="utf-8")
     (tmp_path / "examples").symlink_to(root / "examples")
     monkeypatch.chdir(tmp_path)
@@ -395,10 +395,6 @@ def test_the_manual_is_true(root, tmp_path, monkeypatch, capsys):
     printed = capsys.readouterr().out
     assert "repairable -> feasible repaired" in printed
     assert "{'Solved': 318}" in printed
-    defaults = AnalysisOptions().to_dict()
-    for group in ("repair", "ladder"):
-        rows = dict(re.findall(rf"^\| `{group}\.(\w+)` \| (\S+) \|", text, re.M))
-        assert {name: json.loads(value) for name, value in rows.items()} == defaults[group]
 
 
 # Files.
