@@ -134,7 +134,8 @@ class RepairReport:
         """
         options = replace(self.options, cutoff=None)
         examiner = examiner or make_examiner(self.robot, options, sensitivity=False)
-        return examine(clip, self.robot, options, examiner, self.repair.recorded.schedule)
+        marked = replace(clip, exact=True)  # CSV is so when the summary is there
+        return examine(marked, self.robot, options, examiner, self.repair.recorded.schedule)
 
     def _arguments(self) -> dict[str, Any]:
         """Of :func:`write_motion`."""
