@@ -16,8 +16,9 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import NamedTuple
 
+from dynacom.batch_judge import Judge, error_row
 from dynacom.batch_repair import WritingError
-from dynacom.batch_row import Job, Judge, Row, error_row
+from dynacom.batch_row import Job, Row
 from dynacom.errors import DynacomError
 
 # A worker has one more clip than it works on, so that it need not wait for the next.

@@ -28,11 +28,12 @@ from batch_clips import (
     write_repairable,
     write_without_legs,
 )
-from dynacom import DynacomError, batch_row
+from dynacom import DynacomError, batch_judge
 from dynacom.batch_files import find_motions, find_places
+from dynacom.batch_judge import Judge
 from dynacom.batch_overview import overview
 from dynacom.batch_repair import REASONS, REPAIR_COLUMNS
-from dynacom.batch_row import Job, Judge
+from dynacom.batch_row import Job
 from helpers import WALKS
 
 ROBOT = "anymal_c"
@@ -184,6 +185,15 @@ def test_options_reach_workers(tmp_path, anymal):
     assert balanced["repair_joints_rms"] == found.repair.joints.rms < row["repair_joints_rms"]
 
 
+def test_urls(clips, result, tmp_path):
+    pytest.importorskip("fsspec")
+    table = repair(f"file://{clips[0]}", tmp_path / "out")
+    for name in NAMES:
+        texts = [text and str(text).replace("file://", "") for text in table[name].to_pylist()]
+        assert texts == [text and str(text) for text in result[0][name].to_pylist()]
+    assert tree(tmp_path / "out") == tree(result[1])
+
+
 # Jobs, shards.
 
 
@@ -318,7 +328,7 @@ def test_an_error_of_repair_keeps_the_analysis(tmp_path, judge, monkeypatch):
     path = hurry(tmp_path / "m.npz", 20, 50)
     (good,) = judge("m.npz", str(path), None, "m.npz")
     assert (good["repair"], good["repair_file"]) == ("repaired", "repaired/m.npz")
-    monkeypatch.setattr(batch_row, "repair_clip", fail)
+    monkeypatch.setattr(batch_judge, "repair_clip", fail)
     (row,) = judge("m.npz", str(path), None, "m.npz")
     assert row["repair_error"] == "m.npz: RuntimeError: no luck"
     left = {name for name in row if name.startswith("repair")}
