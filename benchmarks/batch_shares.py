@@ -16,10 +16,11 @@ import numpy as np
 import pyarrow.csv
 
 import dynacom
+from dynacom.batch_judge import Judge
 from dynacom.batch_overview import overview
 from dynacom.batch_page import write_index
 from dynacom.batch_pool import Done, Task
-from dynacom.batch_row import Job, Judge
+from dynacom.batch_row import Job
 from dynacom.batch_store import Store
 from dynacom.motion_report import examine, make_examiner
 

@@ -12,16 +12,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dynacom.analysis_options import AnalysisOptions
-from dynacom.batch_files import find_motions, is_url
+from dynacom.batch_files import find_motions, find_places, is_url
 from dynacom.batch_pool import Done, Pool, Task
+from dynacom.batch_repair import repair_file
 from dynacom.batch_row import Job
 from dynacom.errors import DynacomError
+from dynacom.repair import repair_options
 from dynacom.robots import Robot, load_robot
 
 if TYPE_CHECKING:
     import pyarrow
 
     from dynacom.batch_overview import Overview
+    from dynacom.batch_store import Store
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,9 @@ def batch(
     resume: bool = False,
     frames: bool = False,
     report: int = 0,
+    repair: bool = False,
+    balance_only: bool = False,
+    strict: bool = False,
     progress: Callable[[BatchProgress], None] | None = None,
 ) -> "pyarrow.Table":
     """Judges clips, as :func:`analyze` does: a row for each, with its error if it cannot be judged.
@@ -85,6 +91,9 @@ def batch(
         resume: go on with the batch in `out`, with what has changed, and what is not yet done.
         frames: write the table of each clip's frames to `out`, too.
         report: of so many of the worst clips `out` gets a report each.
+        repair: whether to repair motions, as :func:`repair` does, and to write those that are
+            feasible then to `out`, see docs/batch.md.
+        balance_only, strict: as in :func:`repair`.
         progress: called as files are done.
 
     Returns:
@@ -105,15 +114,18 @@ def batch(
         "engine": engine,
         "jobs": jobs,
         "shard": shard,
+        "balance_only": balance_only,
+        "strict": strict,
         "progress": progress,
     }
     _need_pyarrow()
     import pyarrow.parquet
 
+    own = {"resume": resume, "frames": frames, "report": report, "repair": repair}
     if out is not None:
-        run_batch(paths, robot, out, resume=resume, frames=frames, report=report, **arguments)
+        run_batch(paths, robot, out, **own, **arguments)
         return pyarrow.parquet.read_table(Path(out, "clips.parquet"))
-    for name, value in (("resume", resume), ("frames", frames), ("report", report)):
+    for name, value in own.items():
         if value:
             raise DynacomError(f"{name} needs out, a folder")
     with tempfile.TemporaryDirectory(prefix="dynacom-") as folder:
@@ -136,6 +148,9 @@ def run_batch(
     resume: bool = False,
     frames: bool = False,
     report: int = 0,
+    repair: bool = False,
+    balance_only: bool = False,
+    strict: bool = False,
     progress: Callable[[BatchProgress], None] | None = None,
 ) -> "Overview":
     """As :func:`batch`, without holding the table in memory.
@@ -156,8 +171,9 @@ def run_batch(
     if re.match(r"[a-z][a-z0-9+.-]+:/", str(out), re.IGNORECASE):  # a Path has one slash
         raise DynacomError(f"out must be a folder of this machine, got {out}")
     _check(engine, jobs, shard, fps, quat, report)
-    options = options or AnalysisOptions()
+    options = repair_options(options, balance_only=balance_only, strict=strict)
     options.validate()
+    _check_repair(options, repair, balance_only, strict)
     if report:
         check_reports()
     if engine == "ray":
@@ -167,11 +183,15 @@ def run_batch(
     if not isinstance(robot, Robot):
         robot = load_robot(robot)
     files = find_motions(paths, out)
+    places = find_places(paths, files.values()) if repair else {}
     if shard is not None:
         part, parts = shard
         files = dict(list(files.items())[part - 1 :: parts])
-    folder = out.absolute() / "frames" if frames else None
-    job = Job(robot, options, fps, quat, trust, folder)
+    folders = [
+        out.absolute() / name if is_wanted else None
+        for name, is_wanted in (("frames", frames), ("repaired", repair))
+    ]
+    job = Job(robot, options, fps, quat, trust, *folders)
     with ExitStack() as stack:
         if engine == "local":
             # Processes start while the robot's meshes are read here.
@@ -184,8 +204,12 @@ def run_batch(
 
         def tasks() -> Iterator[Task]:
             for index, (name, file) in enumerate(files.items()):
+                place = places.get(file)
+                known = store.known(index)
+                if place is not None and not _has_repaired(store, index, out, place):
+                    known = None
                 file = file if is_url(file) else os.path.abspath(file)
-                yield Task(index, name, file, store.known(index))
+                yield Task(index, name, file, known, place)
 
         state = BatchProgress(len(files))
         try:
@@ -212,11 +236,30 @@ def run_batch(
     return found
 
 
+def _has_repaired(store: "Store", index: int, out: Path, place: str) -> bool:
+    """Whether what rows tell of a file's repaired motions is so."""
+    told = store.repaired(index)
+    repaired = out / "repaired"
+    return told is None or (told == repair_file(repaired, place) and (repaired / place).exists())
+
+
 def _need_pyarrow() -> None:
     try:
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise DynacomError("a batch needs pyarrow: pip install dynacom[motion]") from error
+
+
+def _check_repair(options: AnalysisOptions, repair: bool, balance_only: bool, strict: bool) -> None:
+    for name, value in (("balance_only", balance_only), ("strict", strict)):
+        if value and not repair:
+            raise DynacomError(f"{name} goes with repair")
+    if repair and options.ladder.largest_stretch != 1.0:
+        # Where it counts, files may have no place to say at which frame rate they are then.
+        raise DynacomError(
+            "ladder.largest_stretch must be 1 in a batch, which does not stretch time, got "
+            f"{options.ladder.largest_stretch:g}"
+        )
 
 
 def _check(

@@ -3,6 +3,8 @@
 
 import errno
 import glob
+import hashlib
+import itertools
 import os
 import re
 import stat
@@ -26,7 +28,9 @@ _PACKAGES = {
     "s3": "s3fs",
 }
 # What a batch writes to its folder, which may be that of the motions.
-_RESULTS = ("clips.parquet", "parts", "frames", "reports")
+_RESULTS = ("clips.parquet", "parts", "frames", "reports", "repaired")
+# Of a file that is written [bytes]: servers allow longer ones than disks do.
+_LONGEST_NAME = 200
 
 
 def find_motions(
@@ -60,6 +64,37 @@ def find_motions(
     return dict(sorted((printable(file), file) for file in files))
 
 
+def find_places(paths: str | Path | Iterable[str | Path], files: Iterable[str]) -> dict[str, str]:
+    """Where what is made of each file lies in a folder: as the files lie in the one they share.
+
+    Which one that is follows from `paths`, so that a file keeps its place when others come or go.
+
+    Args:
+        files: what :func:`find_motions` found at `paths`.
+
+    Returns:
+        A file -> its place, a relative path; no two files have the same one.
+    """
+    if isinstance(paths, str | Path):
+        paths = [paths]
+    parts = {file: _parts(file) for file in files}
+    # A path may be a file itself: its folder is what counts.
+    folders = [_fixed_parts(str(path)) for path in paths] + [own[:-1] for own in parts.values()]
+    shared = len(os.path.commonprefix(folders))
+    places: dict[str, str] = {}
+    taken: set[str] = set()
+    for file, own in parts.items():
+        *inside, name = ("_" if part in (".", "..") else part for part in own[shared:] if part)
+        place = "/".join([*inside, name])
+        if place in taken or len(os.fsencode(name)) > _LONGEST_NAME:
+            # Two names of one file, or of URLs that differ in their queries.
+            digest = hashlib.sha256(os.fsencode(file)).hexdigest()[:12]
+            place = "/".join([*inside, f"{digest}-{_ending(name)}"])
+        taken.add(place)
+        places[file] = place
+    return places
+
+
 def printable(text: str) -> str:
     """The text, with what no UTF-8 can say written in ASCII: names of files may be any bytes."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
@@ -85,11 +120,31 @@ def local_copy(file: str) -> Iterator[Path]:
         return
     with tempfile.TemporaryDirectory(prefix="dynacom-") as folder:
         with _remote(file, "read") as (system, path):
-            name = _without_query(path).rpartition("/")[2]
-            # The end says what it is; a disk's names are shorter than those of servers.
-            copy = Path(folder, name.encode()[-200:].decode(errors="ignore"))
+            copy = Path(folder, _ending(_without_query(path).rpartition("/")[2]))
             system.get_file(path, str(copy))
         yield copy
+
+
+def _ending(name: str) -> str:
+    """The end of a name, which says what it is, no longer than a disk allows."""
+    return os.fsencode(name)[-_LONGEST_NAME:].decode(errors="ignore")
+
+
+def _parts(path: str) -> tuple[str, ...]:
+    """Of a path from the root on, which is empty, or of a URL, whose scheme comes first."""
+    if not is_url(path):
+        return tuple(os.path.abspath(path).split(os.sep))
+    scheme, _, rest = path.partition("::")[0].partition("://")
+    rest = _without_query(f"{scheme}://{rest}").partition("://")[2]
+    return (scheme.lower(), *filter(None, rest.split("/")))
+
+
+def _fixed_parts(path: str) -> tuple[str, ...]:
+    """Those of a path, or those of a glob before what it leaves open."""
+    parts = _parts(path)
+    if not is_url(path) and os.path.lexists(path):
+        return parts
+    return tuple(itertools.takewhile(lambda part: not glob.has_magic(part), parts))
 
 
 def _find_local(path: str, out: Path | None) -> Iterator[str]:

@@ -2,7 +2,9 @@
 """What is to be said of all clips of a batch together."""
 
 import heapq
+import json
 import math
+import statistics
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -10,6 +12,7 @@ from pathlib import Path
 
 import pyarrow.parquet
 
+from dynacom.batch_repair import OUTCOMES
 from dynacom.batch_row import Row
 from dynacom.motion_report import FAULTS
 
@@ -22,8 +25,33 @@ _COLUMNS = (
     *("frames", "duration"),
     *("mean_vertical_force", "residual_force_rms", "residual_torque_rms"),
     *("distance_rms", "distance_max"),
+    *("repair", "repair_root_max", "repair_reasons", "repair_file", "repair_error"),
     *(f"{code}.{column}" for code in FAULTS for column in ("holds", "frames", "worst")),
 )
+# A folder's ground is worth a word if it has so many clips, if theirs lie no farther apart than
+# this [m], and none nearer to zero.
+_GROUND_CLIPS = 3
+_GROUND_SPREAD = 0.02
+_GROUND_HEIGHT = 0.01
+
+
+@dataclass(frozen=True)
+class Ground:
+    """On which the clips of a folder stand, one for all, which is not at zero."""
+
+    #: Empty for all folders together.
+    folder: str
+    clips: int
+    #: [m]
+    height: float
+
+    def text(self) -> str:
+        """A sentence."""
+        where = f" in {self.folder}" if self.folder else ""
+        return (
+            f"The ground of all {self.clips} clips{where} whose ground is known lies at "
+            f"{self.height:.2f} m."
+        )
 
 
 @dataclass
@@ -45,6 +73,18 @@ class Overview:
     worst: list[Row] = field(default_factory=list)
     #: Rows of the first clips that could not be judged.
     failed: list[Row] = field(default_factory=list)
+    #: Whether the batch repairs motions, too.
+    repairs: bool = False
+    #: Outcome of repair -> clips that have it; all outcomes, from the best to the worst.
+    outcomes: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(OUTCOMES, 0)))
+    #: Code -> clips that it keeps from being repaired; codes that do.
+    repair_codes: Counter[str] = field(default_factory=Counter)
+    #: Clips that could be judged, but whose repair failed, or could not be written.
+    repair_errors: int = 0
+    #: Rows of the first of these.
+    repair_failed: list[Row] = field(default_factory=list)
+    #: Grounds worth a word.
+    grounds: list[Ground] = field(default_factory=list)
 
     @property
     def clips(self) -> int:
@@ -64,14 +104,66 @@ def overview(table: Path, listed: int = _LISTED) -> Overview:
         listed: how long lists may be.
     """
     found = Overview()
-    found.worst = heapq.nlargest(listed, _judged(table, found, listed), key=_badness)
+    file = pyarrow.parquet.ParquetFile(table)
+    settings = json.loads(file.schema_arrow.metadata[b"dynacom.settings"])
+    found.repairs = settings["repair"]
+    contacts = [name for name in file.schema_arrow.names if name.endswith(".ground")]
+    if settings["options"]["detection"]["ground_height"] is not None:
+        contacts = []  # it is where the user says
+    grounds: dict[str, _Heights] = {}
+    rows = _judged(file, contacts, found, grounds, listed)
+    found.worst = heapq.nlargest(listed, rows, key=_badness)
+    found.grounds = _find_grounds(grounds)
     return found
 
 
-def _judged(table: Path, found: Overview, listed: int) -> Iterator[Row]:
-    """The clips that were judged; all are counted on the way."""
-    file = pyarrow.parquet.ParquetFile(table)
-    for rows in file.iter_batches(batch_size=500, columns=list(_COLUMNS)):
+@dataclass
+class _Heights:
+    """Of the ground of a folder's clips [m]."""
+
+    clips: int = 0
+    lowest: float = math.inf
+    highest: float = -math.inf
+
+    def add(self, other: "_Heights") -> None:
+        self.clips += other.clips
+        self.lowest = min(self.lowest, other.lowest)
+        self.highest = max(self.highest, other.highest)
+
+    def ground(self, folder: str) -> Ground | None:
+        """That of all, if it is worth a word."""
+        nearest = max(self.lowest, -self.highest)  # negative where they are on both sides of zero
+        is_one = self.highest - self.lowest <= _GROUND_SPREAD
+        if self.clips < _GROUND_CLIPS or not is_one or nearest < _GROUND_HEIGHT:
+            return None
+        return Ground(folder, self.clips, (self.lowest + self.highest) / 2.0)
+
+
+def _find_grounds(folders: dict[str, _Heights]) -> list[Ground]:
+    """Of all clips together, or else of folders."""
+    together = _Heights()
+    for heights in folders.values():
+        together.add(heights)
+    if (ground := together.ground("")) is not None:
+        return [ground]
+    found = (heights.ground(folder) for folder, heights in folders.items())
+    return [ground for ground in found if ground is not None]
+
+
+def _judged(
+    file: pyarrow.parquet.ParquetFile,
+    contacts: list[str],
+    found: Overview,
+    grounds: dict[str, _Heights],
+    listed: int,
+) -> Iterator[Row]:
+    """The clips that were judged; all are counted on the way.
+
+    Args:
+        contacts: columns that have the height of the ground.
+        grounds: folder -> what is known of its clips' grounds.
+    """
+    for rows in file.iter_batches(batch_size=500, columns=[*_COLUMNS, *contacts]):
         for row in rows.to_pylist():
             if row["status"] == "error":
                 found.errors += 1
@@ -83,7 +175,25 @@ def _judged(table: Path, found: Overview, listed: int) -> Iterator[Row]:
             found.codes.update(code for code in row["codes"] if code in FAULTS)
             found.frames += row["frames"]
             found.duration += row["duration"]
+            _count_repair(row, found, listed)
+            heights = [row[name] for name in contacts if row[name] is not None]
+            if heights:
+                height = statistics.fmean(heights)
+                folder = row["file"].rpartition("/")[0]
+                own = _Heights(1, height, height)
+                grounds.setdefault(folder, _Heights()).add(own)
             yield row
+
+
+def _count_repair(row: Row, found: Overview, listed: int) -> None:
+    if row["repair_error"] is not None:
+        found.repair_errors += 1
+        if len(found.repair_failed) < listed:
+            found.repair_failed.append(row)
+    elif row["repair"] is not None:
+        found.outcomes[row["repair"]] += 1
+        if row["repair_reasons"] is not None:
+            found.repair_codes.update(row["repair_reasons"].split("+"))
 
 
 def _badness(row: Row) -> tuple[int, float, float]:

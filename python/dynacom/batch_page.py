@@ -8,10 +8,14 @@ from pathlib import Path
 from string import Template
 
 from dynacom.batch_overview import Overview
+from dynacom.batch_repair import REASONS
 from dynacom.batch_row import Job, Row
 from dynacom.batch_store import whole, writing
 from dynacom.dynacom_pywrap import __version__
 from dynacom.motion_report import FAULTS, TOO_SHORT
+
+# So many folders' grounds are told.
+_GROUNDS = 20
 
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
@@ -47,11 +51,13 @@ small { opacity: .75; }
 <h1>$clips clips of $robot</h1>
 <p>$frames frames, $duration of motion, $feasible of it in windows without fault. The table of all
 clips is <code>clips.parquet</code> beside this page.</p>
+$grounds
 <h2>Verdicts</h2>
 <table class="bars">$verdicts</table>
 <h2>Reasons</h2>
 <p>Clips in which each fault holds; a clip may have several.</p>
 <table class="bars">$reasons</table>
+$repair
 <h2>Clips, the worst first</h2>
 $worst
 <h2>Errors</h2>
@@ -107,12 +113,38 @@ def write_index(
         feasible=f"{found.feasible_frames / max(found.frames, 1):.1%}",
         verdicts=_bars(verdicts, found.clips),
         reasons=_bars(reasons, found.clips),
+        grounds="".join(f"<p>{escape(ground.text())}</p>" for ground in found.grounds[:_GROUNDS]),
+        repair=_repair(found),
         worst=_worst(found, links),
         errors=_errors(found),
         version=escape(__version__),
     )
     with writing(path.parent), whole(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _repair(found: Overview) -> str:
+    """The section on repair, if there was one."""
+    if not found.repairs:
+        return ""
+    kinds = {"feasible": "ok", "repaired": "mid", "not repaired": ""}
+    outcomes = [(outcome, count, kinds[outcome]) for outcome, count in found.outcomes.items()]
+    outcomes.append(("failed", found.repair_errors, "err"))
+    reasons = ((f"{code}: {REASONS[code]}", n, "") for code, n in found.repair_codes.most_common())
+    parts = [
+        "<h2>Repair</h2>",
+        "<p>Clips that are feasible, as they are or repaired, are in the folder "
+        "<code>repaired</code> beside this page.</p>",
+        f'<table class="bars">{_bars(outcomes, found.clips)}</table>',
+    ]
+    if found.repair_codes:
+        parts += [
+            "<p>What is left in clips that are not repaired; in one there may be several.</p>",
+            f'<table class="bars">{_bars(reasons, found.clips)}</table>',
+        ]
+    if found.repair_failed:
+        parts.append(_failed(found.repair_failed, "repair_error", found.repair_errors))
+    return "".join(parts)
 
 
 def _duration(seconds: float) -> str:
@@ -154,6 +186,7 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
             + _number(row["feasible_share"], f"{row['feasible_share']:.1%}")
             + _number(_millimetres(row["distance_rms"]))
             + _number(_millimetres(row["distance_max"]))
+            + (_repair_cells(row) if found.repairs else "")
             + _number(row["residual_force_rms"])
             + _number(row["residual_torque_rms"])
             + _number(row["mean_vertical_force"])
@@ -168,6 +201,7 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
         ("In windows", "n"),
         ("Distance RMS [mm]", "n"),
         ("Distance at most [mm]", "n"),
+        *((("Repair", ""), ("Root displaced at most [mm]", "n")) if found.repairs else ()),
         ("Residual force RMS [m g]", "n"),
         ("Residual moment RMS [m g m]", "n"),
         ("Mean vertical force [m g]", "n"),
@@ -175,6 +209,13 @@ def _worst(found: Overview, links: Mapping[tuple[str, str | None], str]) -> str:
     )
     note = f"<p>{len(rows)} of {judged}.</p>" if len(rows) < judged else ""
     return note + _table(titles, rows)
+
+
+def _repair_cells(row: Row) -> str:
+    outcome = row["repair"] if row["repair_error"] is None else "failed"
+    if row["repair_reasons"]:
+        outcome += f": {row['repair_reasons'].replace('+', ', ')}"
+    return f"<td>{escape(outcome)}</td>{_number(_millimetres(row['repair_root_max']))}"
 
 
 def _reasons(row: Row) -> str:
@@ -191,11 +232,15 @@ def _reasons(row: Row) -> str:
 def _errors(found: Overview) -> str:
     if not found.errors:
         return "<p>None.</p>"
+    return _failed(found.failed, "error", found.errors)
+
+
+def _failed(failed: list[Row], column: str, count: int) -> str:
+    """A table of errors, of so many."""
     rows = [
-        f"<tr><td>{escape(_title(row))}</td><td>{escape(row['error'])}</td></tr>"
-        for row in found.failed
+        f"<tr><td>{escape(_title(row))}</td><td>{escape(row[column])}</td></tr>" for row in failed
     ]
-    note = f"<p>{len(rows)} of {found.errors}.</p>" if len(rows) < found.errors else ""
+    note = f"<p>{len(rows)} of {count}.</p>" if len(rows) < count else ""
     return note + _table((("Clip", ""), ("Error", "")), rows)
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """Worker processes that judge clips, and that may die.
 
-A clip whose worker dies is tried once more, in another; if that one dies, too, the clip has an
-error, and the others go on.
+A clip whose worker dies is tried once more, in another, and then, if it is to be repaired, without
+that; if all of them die, the clip has an error, and the others go on.
 """
 
 import os
@@ -16,7 +16,9 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import NamedTuple
 
-from dynacom.batch_row import FramesError, Job, Judge, Row, error_row
+from dynacom.batch_judge import Judge, error_row
+from dynacom.batch_repair import WritingError
+from dynacom.batch_row import Job, Row
 from dynacom.errors import DynacomError
 
 # A worker has one more clip than it works on, so that it need not wait for the next.
@@ -31,6 +33,7 @@ class Task(NamedTuple):
     name: str
     file: str
     known: str | None
+    place: str | None = None
 
 
 class Done(NamedTuple):
@@ -68,7 +71,7 @@ class Pool:
             What is done; and None now and then, when nothing is.
 
         Raises:
-            DynacomError: workers cannot be started, or cannot write frames.
+            DynacomError: workers cannot be started, or cannot write results.
         """
         tasks = iter(tasks)
         again: deque[Task] = deque()
@@ -96,8 +99,11 @@ class Pool:
                 deaths[first.index] += 1
                 if deaths[first.index] == 1:
                     again.appendleft(first)
+                elif first.place is not None:
+                    again.appendleft(first._replace(place=None))
                 else:
-                    message = f"{first.name}: its worker process died twice ({how})"
+                    times = {2: "twice", 3: "three times"}[deaths[first.index]]
+                    message = f"{first.name}: its worker process died {times} ({how})"
                     yield Done(first.index, [error_row(self._job, first.name, message)])
 
     def close(self) -> None:
@@ -164,10 +170,10 @@ class _Worker:
 
         Raises:
             EOFError, OSError: the worker has died.
-            FramesError: it cannot write frames.
+            WritingError: it cannot write results.
         """
         reply = self.connection.recv()
-        if isinstance(reply, FramesError):
+        if isinstance(reply, WritingError):
             raise reply
         self.has_started = True
         if reply is None:
@@ -200,7 +206,7 @@ def work(descriptor: int) -> None:
         while True:
             task = pipe.recv()
             try:
-                pipe.send(Done(task.index, judge(task.name, task.file, task.known)))
-            except FramesError as error:
+                pipe.send(Done(task.index, judge(*task[1:])))
+            except WritingError as error:
                 pipe.send(error)
                 return

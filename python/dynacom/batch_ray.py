@@ -66,7 +66,7 @@ class RayPool:
         """Judges files, in any order, as :meth:`Pool.run`.
 
         Raises:
-            DynacomError: workers cannot be started, or cannot write frames.
+            DynacomError: workers cannot be started, or cannot write results.
         """
         items = [{"task": pickle.dumps(tuple(task))} for task in tasks]
         if not items:

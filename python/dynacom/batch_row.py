@@ -6,18 +6,17 @@ import json
 import math
 import os
 import secrets
-import time
 import urllib.parse
-from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dynacom.analysis_options import AnalysisOptions
-from dynacom.batch_files import local_copy, printable
+from dynacom.batch_files import printable
+from dynacom.batch_repair import REPAIR_COLUMNS, WRITING, WritingError
 from dynacom.dynacom_pywrap import (
     CollisionPoints,
     Contact6DSettings,
@@ -25,17 +24,7 @@ from dynacom.dynacom_pywrap import (
     DistributionStatus,
     __version__,
 )
-from dynacom.errors import DynacomError
-from dynacom.motion_clip import Options
-from dynacom.motion_file import Clip, read_motion
-from dynacom.motion_pickle import read_clips
-from dynacom.motion_report import (
-    FAULTS,
-    MotionReport,
-    examine,
-    make_examiner,
-    window_times,
-)
+from dynacom.motion_report import FAULTS, MotionReport, window_times
 from dynacom.other_contacts import body_statistics, seat_statistics
 from dynacom.robots import Robot
 from dynacom.terrain import ground_heights
@@ -76,6 +65,7 @@ _COLUMNS = (
     ("no_contact_share", "double", ""),
     ("bodies", "bodies", ""),
     ("seats", "seats", ""),
+    *REPAIR_COLUMNS,
 )
 # Of the columns that hold a list of things: what is known of each.
 _THINGS = {
@@ -132,6 +122,8 @@ class Job:
     trust: bool = False
     #: Where the tables of frames go; None for nowhere.
     frames: Path | None = None
+    #: Where repaired motions go; None if nothing is repaired.
+    repair: Path | None = None
 
     def __reduce__(self) -> tuple:
         robot = self.robot
@@ -143,11 +135,14 @@ class Job:
         # Meshes are read once, and not by every process.
         points = None if self.options.feet_only else robot.collision_points
         options = self.options.to_dict()
-        return _make_job, (parts, points, options, self.fps, self.quat, self.trust, self.frames)
+        others = (self.fps, self.quat, self.trust, self.frames, self.repair)
+        return _make_job, (parts, points, options, *others)
 
     def settings(self) -> dict[str, Any]:
         """All that results depend on, but for the files: it can be written as JSON."""
-        robot = self.robot
+        robot, options = self.robot, self.options.to_dict()
+        if self.repair is None:
+            del options["repair"], options["ladder"]
         return {
             "dynacom": __version__,
             "robot": robot.name,
@@ -156,11 +151,12 @@ class Job:
             "joint_layouts": robot.joint_layouts,
             "contacts": {name: _jsonable(s) for name, s in robot.contacts.items()},
             "bodies": None if self.options.feet_only else _digest_bodies(robot),
-            "options": self.options.to_dict(),
+            "options": options,
             "fps": self.fps,
             "quat": self.quat,
             "trust": self.trust,
             "frames": self.frames is not None,
+            "repair": self.repair is not None,
         }
 
     def key(self) -> str:
@@ -238,116 +234,7 @@ def _digest_bodies(robot: Robot) -> str:
     return digest.hexdigest()
 
 
-class FramesError(DynacomError):
-    """A table of frames cannot be written: not the clip's fault, nor would the next do better."""
-
-
-class Judge:
-    """Analyses clips, one after the other, and has no memory of them."""
-
-    def __init__(self, job: Job) -> None:
-        self._job = job
-        self._reading = Options(job.fps, job.quat, job.trust)
-        # One thread: there are other processes.
-        self._examiner = make_examiner(job.robot, job.options, sensitivity=False, threads=1)
-
-    def __call__(self, name: str, file: str, known: str | None) -> list[Row] | None:
-        """The rows of a file: one per clip in it, whatever it holds.
-
-        Args:
-            name: the file's in results.
-            file: a path or a URL.
-            known: the SHA-256 of a file of which the rows are known already.
-
-        Returns:
-            The rows, or None if that is this file.
-
-        Raises:
-            FramesError: what was found cannot be written.
-        """
-        start = time.perf_counter()
-        path = Path(file)
-        digest = None
-        rows: list[Row] = []
-        try:
-            with local_copy(file) as path:
-                with path.open("rb") as opened:
-                    digest = _digest(opened)
-                if digest == known:
-                    return None
-                for clip, read in self._clips(path):
-                    found = self._judge(name, clip, path, read)
-                    rows.append(found | {"sha256": digest, "seconds": time.perf_counter() - start})
-                    start = time.perf_counter()
-        except FramesError:
-            raise
-        except Exception as error:  # whatever the file made any library raise
-            message = _message(error, name, path)
-            rows.append(
-                error_row(self._job, name, message)
-                | {"sha256": digest, "seconds": time.perf_counter() - start}
-            )
-        return rows
-
-    def _clips(self, path: Path) -> Iterator[tuple[str | None, Callable[[], Clip]]]:
-        """The clips of a file by name: None for one that is alone."""
-        robot, reading = self._job.robot, self._reading
-        if path.suffix.lower() in (".pkl", ".pickle", ".joblib") and path.is_file():
-            with np.errstate(all="ignore"):
-                yield from read_clips(path, robot, reading)
-        else:
-            yield None, lambda: read_motion(path, robot, **asdict(reading))
-
-    def _judge(self, name: str, clip: str | None, path: Path, read: Callable[[], Clip]) -> Row:
-        job = self._job
-        clip = None if clip is None else printable(clip)
-        frames = None if job.frames is None else _frames_file(job.frames, job.robot, name, clip)
-        try:
-            with np.errstate(all="ignore"):
-                report = examine(read(), job.robot, job.options, self._examiner)
-            row = _report_row(report, name)
-        except Exception as error:
-            if frames is not None:
-                with suppress(OSError):
-                    frames.unlink()  # of the file as it was before
-            return error_row(job, name, _message(error, name, path)) | {"clip": clip}
-        if frames is not None:
-            _write_frames(report, name, clip, frames, job.frames)
-        return row | {"clip": clip}
-
-
-def _digest(file: BinaryIO) -> str:
-    digest = hashlib.sha256()
-    while block := file.read(1 << 20):
-        digest.update(block)
-    return digest.hexdigest()
-
-
-def error_row(job: Job, name: str, message: str) -> Row:
-    """The row of a clip that could not be judged."""
-    return {
-        "file": name,
-        "robot": printable(job.robot.name),
-        "status": "error",
-        "error": message,
-        "dynacom": __version__,
-    }
-
-
-def _message(error: Exception, name: str, path: Path) -> str:
-    """One line."""
-    if isinstance(error, OSError):
-        text = f"{name}: cannot be read ({error.strerror or error})"
-    elif isinstance(error, DynacomError):
-        text = str(error)
-    else:
-        text = f"{name}: {type(error).__name__}: {error}"
-    # A copy's name says nothing.
-    text = printable(text.replace(str(path), name))
-    return " ".join(text.split())
-
-
-def _report_row(report: MotionReport, name: str) -> Row:
+def report_row(report: MotionReport, name: str) -> Row:
     """What the summary says, without its sentences: those take as long as the analysis."""
     found = report.examination
     statistics, derived = found.statistics, found.derived
@@ -385,6 +272,11 @@ def _report_row(report: MotionReport, name: str) -> Row:
         for column, _, _ in _CONTACT_COLUMNS:
             value = grounds[contact.name] if column == "ground" else getattr(contact, column)
             row[f"contact.{contact.name}.{column}"] = value
+    return without_nan(row)
+
+
+def without_nan(row: Row) -> Row:
+    """The row, with null where a number does not exist, or is too large."""
     return {
         column: None if isinstance(value, float) and not math.isfinite(value) else value
         for column, value in row.items()
@@ -394,7 +286,7 @@ def _report_row(report: MotionReport, name: str) -> Row:
 # Frames.
 
 
-def _frames_file(folder: Path, robot: Robot, name: str, clip: str | None) -> Path:
+def frames_file(folder: Path, robot: Robot, name: str, clip: str | None) -> Path:
     """Where a clip's table lies: partitioned, since folders of a million files serve nobody."""
     text = name if clip is None else f"{name}\0{clip}"
     digest = hashlib.sha256(text.encode()).hexdigest()
@@ -404,9 +296,19 @@ def _frames_file(folder: Path, robot: Robot, name: str, clip: str | None) -> Pat
     return folder / f"robot={robot_name}" / f"bucket={bucket}" / f"{digest[:32]}.parquet"
 
 
-def _write_frames(
+def write_frames(
     report: MotionReport, name: str, clip: str | None, path: Path, folder: Path
 ) -> None:
+    """Writes a clip's table, as a whole.
+
+    Args:
+        name: of the file in results.
+        path: see :func:`frames_file`.
+        folder: of all tables.
+
+    Raises:
+        WritingError: the folder cannot be written to.
+    """
     import pyarrow
     import pyarrow.parquet
 
@@ -433,7 +335,7 @@ def _write_frames(
         array = pyarrow.array(values.tolist() if values.dtype.kind == "U" else values)
         fields.append(pyarrow.field(column, array.type, metadata={"unit": unit}))
         arrays.append(array)
-    temporary = folder / ".writing" / f"{path.stem}-{secrets.token_hex(4)}.parquet"
+    temporary = folder / WRITING / f"{path.stem}-{secrets.token_hex(4)}.parquet"
     try:
         for parent in (path.parent, temporary.parent):
             parent.mkdir(parents=True, exist_ok=True)
@@ -443,4 +345,4 @@ def _write_frames(
     except OSError as error:
         with suppress(OSError):
             temporary.unlink()
-        raise FramesError(f"{folder}: cannot be written ({error.strerror or error})") from error
+        raise WritingError(f"{folder}: cannot be written ({error.strerror or error})") from error

@@ -4,6 +4,7 @@
 clips.parquet       the table: when the batch has ended
 parts/*.parquet     rows, as they came
 frames/             tables of frames, on demand
+repaired/           motions, on demand
 .lock               held by the batch that writes
 """
 
@@ -19,6 +20,7 @@ import numpy as np
 import pyarrow
 import pyarrow.parquet
 
+from dynacom.batch_repair import WRITING
 from dynacom.batch_row import Job, Row
 from dynacom.errors import DynacomError
 
@@ -41,6 +43,7 @@ class Store:
         #: Of each file, the part that has its rows; -1 where there is none.
         self._part_of = np.full(len(names), -1, dtype=np.int32)
         self._digests: dict[int, str | None] = {}
+        self._repaired: dict[int, str] = {}
         self._number = 0
         self._rows: list[Row] = []
         self._waiting: list[int] = []
@@ -86,6 +89,10 @@ class Store:
     def known(self, index: int) -> str | None:
         """The SHA-256 of a file whose rows are known; None if it had none, or killed its worker."""
         return self._digests.get(index)
+
+    def repaired(self, index: int) -> str | None:
+        """The file of repaired motions that rows tell of, from the folder; None if of none."""
+        return self._repaired.get(index)
 
     def add(self, index: int, rows: list[Row]) -> None:
         """Adds the rows of a file. They are safe after some seconds, or :meth:`flush`.
@@ -143,6 +150,7 @@ class Store:
             for number in self._numbers():
                 if number not in self._part_of:
                     self._part(number).unlink()
+        self._remove_unfinished()
 
     def _in_order(self) -> Iterator[pyarrow.Table]:
         """The rows in the order of the files, without more in memory than must be.
@@ -191,7 +199,7 @@ class Store:
             )
         for temporary in [*self._folder.glob(".*.tmp"), *self._parts.glob(".*.tmp")]:
             temporary.unlink()
-        shutil.rmtree(self._folder / "frames" / ".writing", ignore_errors=True)
+        self._remove_unfinished()
         self._number = max(numbers, default=0)
         key = self._schema.metadata[b"dynacom.key"]
         for number in numbers:
@@ -199,13 +207,24 @@ class Store:
                 file = pyarrow.parquet.ParquetFile(self._part(number))
                 if (file.schema_arrow.metadata or {}).get(b"dynacom.key") != key:
                     continue
-                table = file.read(["file", "sha256"])
+                table = file.read(["file", "sha256", "repair_file"])
             except pyarrow.ArrowInvalid:
                 continue  # the machine has crashed
-            for name, digest in zip(*(column.to_pylist() for column in table), strict=True):
-                if (index := self._index.get(name)) is not None:
-                    self._digests[index] = digest
-                    self._part_of[index] = number
+            columns = (column.to_pylist() for column in table)
+            for name, digest, repaired in zip(*columns, strict=True):
+                if (index := self._index.get(name)) is None:
+                    continue
+                if self._part_of[index] != number:  # the rows before are of no use any more
+                    self._repaired.pop(index, None)
+                self._digests[index] = digest
+                self._part_of[index] = number
+                if repaired is not None:
+                    self._repaired[index] = repaired
+
+    def _remove_unfinished(self) -> None:
+        """What workers were writing when they ended."""
+        for results in ("frames", "repaired"):
+            shutil.rmtree(self._folder / results / WRITING, ignore_errors=True)
 
     def _part(self, number: int) -> Path:
         return self._parts / f"part-{number:08}.parquet"

@@ -530,8 +530,29 @@ def batch(
     report: Annotated[
         int, typer.Option(metavar="N", help="Write a report of each of the N worst clips.")
     ] = 0,
+    repair: Annotated[
+        bool,
+        typer.Option(
+            "--repair",
+            help="Write the motions to DIR/repaired, too: those that are feasible as they are, and "
+            "those that can be repaired.",
+        ),
+    ] = False,
+    balance_only: Annotated[
+        bool,
+        typer.Option(
+            "--balance-only", help="With --repair: only what contacts can give, no feet, no joints."
+        ),
+    ] = False,
+    strict: Annotated[
+        bool,
+        typer.Option(
+            "--strict",
+            help="With --repair: mend single frames, too, of motions that are feasible as a whole.",
+        ),
+    ] = False,
 ) -> None:
-    """Judge many motions: a row per clip, whatever the clip.
+    """Judge many motions, and repair them: a row per clip, whatever the clip.
 
     Writes DIR/clips.parquet and DIR/index.html, and prints a summary.
     """
@@ -563,6 +584,9 @@ def batch(
                 resume=resume,
                 frames=frames,
                 report=report,
+                repair=repair,
+                balance_only=balance_only,
+                strict=strict,
                 progress=keep,
             )
     except KeyboardInterrupt:
@@ -574,7 +598,7 @@ def batch(
         raise typer.Exit(130) from None
     console = Console()
     console.print(overview_table(found, state))
-    for name in ("clips.parquet", "index.html"):
+    for name in ("clips.parquet", "index.html", *["repaired"] * repair):
         console.print(f"Wrote {out / name}", highlight=False, markup=False, soft_wrap=True)
 
 

@@ -55,27 +55,6 @@ def read_pickle(path: Path, robot: Robot, options: Options) -> Clip:
     return _read(path, _choose(path, _load(path, options.trust), options.clip), robot, options)
 
 
-def read_clips(
-    path: Path, robot: Robot, options: Options
-) -> Iterator[tuple[str | None, Callable[[], Clip]]]:
-    """Loads such a file once, for all the clips that it holds.
-
-    Yields:
-        The name of a clip, None where there is but one, and a function that makes the clip, or
-        raises DynacomError.
-
-    Raises:
-        DynacomError, OSError: as :func:`read_pickle`.
-    """
-    content = _load(path, options.trust)
-    if _holds_clips(content) and len(content) > 1:
-        for name, inner in content.items():
-            chosen = replace(options, clip=str(name))
-            yield str(name), partial(_read, path, inner, robot, chosen)
-    else:
-        yield None, partial(_read, path, _choose(path, content, None), robot, options)
-
-
 def write_pickle(change: Change) -> bytes:
     """The file with a change in one clip: keys, types, shapes and the pickle's protocol are kept.
 
@@ -83,16 +62,84 @@ def write_pickle(change: Change) -> bytes:
         DynacomError: as :func:`write_motion`.
         OSError: the file cannot be read.
     """
-    path, options = change.clip.path, change.clip.options
-    content = _load(path, options.trust)
-    clip = _choose(path, content, options.clip)
-    if change.moves:
-        layout = _find_layout(path, clip, change.clip.robot, options)
-        _change_clip(change, clip, layout)
-    clip.pop(MARK, None)
-    if change.mark:
-        clip[MARK] = mark_text()
-    return _dump(path, content)
+    file = PickleFile(change.clip.path, change.clip.options)
+    file.change(change)
+    return file.dump()
+
+
+class PickleFile:
+    """Such a file, loaded once for all the clips that it holds."""
+
+    def __init__(self, path: Path, options: Options) -> None:
+        """Loads it.
+
+        Raises:
+            DynacomError, OSError: as :func:`read_pickle`.
+        """
+        self._path, self._options = path, options
+        self._content = _load(path, options.trust)
+        has_names = _holds_clips(self._content) and len(self._content) > 1
+        #: Clip's name in results -> its key in the file.
+        self._keys = {str(key): key for key in self._content} if has_names else {}
+
+    def clips(self, robot: Robot) -> Iterator[tuple[str | None, Callable[[], Clip]]]:
+        """All of them.
+
+        Yields:
+            The name of a clip, None where there is but one, and a function that makes the clip, or
+            raises DynacomError.
+
+        Raises:
+            DynacomError: the file holds none.
+        """
+        if not self._keys:
+            clip = _choose(self._path, self._content, self._options.clip)
+            yield None, partial(_read, self._path, clip, robot, self._options)
+            return
+        for key, clip in list(self._content.items()):  # which may be dropped meanwhile
+            chosen = replace(self._options, clip=str(key))
+            yield str(key), partial(_read, self._path, clip, robot, chosen)
+
+    def read(self, name: str | None, robot: Robot) -> Clip:
+        """A clip, as it is now.
+
+        Raises:
+            DynacomError: as :func:`read_pickle`.
+        """
+        chosen = replace(self._options, clip=name)
+        return _read(self._path, self._find(name), robot, chosen)
+
+    def change(self, change: Change) -> None:
+        """Changes one of the clips, here and not on the disk.
+
+        Raises:
+            DynacomError: as :func:`write_motion`.
+        """
+        clip, options = self._find(change.clip.options.clip), self._options
+        if change.moves:
+            layout = _find_layout(self._path, clip, change.clip.robot, options)
+            _change_clip(change, clip, layout)
+        clip.pop(MARK, None)
+        if change.mark:
+            clip[MARK] = mark_text()
+
+    def drop(self, name: str) -> None:
+        """Takes out one of several clips, here and not on the disk."""
+        del self._content[self._keys.pop(name)]
+
+    def dump(self) -> bytes:
+        """The file's bytes, as it is now.
+
+        Raises:
+            DynacomError: it holds what cannot be written.
+            OSError: the file cannot be read.
+        """
+        return _dump(self._path, self._content)
+
+    def _find(self, name: str | None) -> dict[str, Any]:
+        if name in self._keys:
+            return self._content[self._keys[name]]
+        return _choose(self._path, self._content, name)
 
 
 def _read(path: Path, content: Mapping[str, Any], robot: Robot, options: Options) -> Clip:

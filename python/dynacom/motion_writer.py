@@ -76,15 +76,25 @@ def write_motion(
     if path.resolve() == clip.path.resolve() or (path.exists() and path.samefile(clip.path)):
         raise DynacomError(f"{path}: must be another file than the one that was read")
     change = Change.of(clip, q, schedule, forces, mark, stretch)
-    try:
-        content = _WRITERS[suffix](change)
-    except OSError as error:
-        raise DynacomError(f"{clip.path}: cannot be read ({error.strerror or error})") from error
+    content = motion_content(change)
     try:
         _replace(path, content)
     except OSError as error:
         raise DynacomError(f"{path}: cannot be written ({error.strerror or error})") from error
     return change.notes
+
+
+def motion_content(change: Change) -> bytes:
+    """The file of a clip, with a change in it.
+
+    Raises:
+        DynacomError: the clip's file cannot be read or has changed.
+    """
+    path = change.clip.path
+    try:
+        return _WRITERS[suffix_of(path)](change)
+    except OSError as error:
+        raise DynacomError(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
 def _replace(path: Path, content: bytes) -> None:

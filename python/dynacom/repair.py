@@ -13,8 +13,15 @@ import numpy as np
 
 from dynacom.analysis_options import AnalysisOptions
 from dynacom.contacts_file import write_contacts
-from dynacom.dynacom_pywrap import ContactSchedule, Motion, MotionRepair, MotionRepairer
+from dynacom.dynacom_pywrap import (
+    ContactSchedule,
+    Motion,
+    MotionExaminer,
+    MotionRepair,
+    MotionRepairer,
+)
 from dynacom.errors import DynacomError
+from dynacom.motion_change import Change
 from dynacom.motion_clip import is_point
 from dynacom.motion_file import Clip, read_motion
 from dynacom.motion_mark import mark_of
@@ -88,32 +95,28 @@ class RepairReport:
         if not self.changed:
             _copy(self.clip.path, Path(path))
             return mark_of(path) | {"exact": self.clip.exact} | _written(self.after), []
-        after = self.repair.after
-        forces = {
-            contact.name: contact.wrench[:, : 3 if is_point(self.robot, contact.name) else 6]
-            for contact in after.analysis.contacts
-        }
-        notes = write_motion(
-            self.clip,
-            path,
-            self.repair.recorded.q,
-            schedule=after.schedule,
-            forces=forces,
-            stretch=self.repair.stretch,
-        )
-        written = self._read_again(Path(path))
+        notes = write_motion(self.clip, path, **self._arguments())
+        written = self.examine_written(self.read_again(path))
         if written.verdict.outcome != self.after.verdict.outcome:
-            notes.append(
-                f"The motion is {written.verdict.outcome} "
-                f"({', '.join(written.verdict.codes)}) as it was written: its file cannot hold all "
-                "that was changed."
-            )
+            notes.append(different_text(written))
         return mark_of(path) | _written(written), notes
 
-    def _read_again(self, path: Path) -> MotionReport:
-        """What is found of the motion as it was written."""
+    def change(self) -> Change:
+        """What of the clip's file is another thing now, for whoever writes several clips at once.
+
+        Raises:
+            DynacomError: as :func:`write_motion`.
+        """
+        return Change.of(self.clip, mark=True, **self._arguments())
+
+    def read_again(self, path: str | Path) -> Clip:
+        """The motion as it was written.
+
+        Raises:
+            DynacomError: as :func:`read_motion`.
+        """
         how = self.clip.options
-        read = read_motion(
+        return read_motion(
             path,
             self.robot,
             fps=None if how.fps is None else how.fps / self.repair.stretch,
@@ -121,11 +124,32 @@ class RepairReport:
             trust=how.trust,
             clip=how.clip,
         )
-        options = copy.deepcopy(self.options)
-        options.cutoff = None
-        examiner = make_examiner(self.robot, options, sensitivity=False)
-        marked = replace(read, exact=True)  # CSV is so when the summary is there
+
+    def examine_written(self, clip: Clip, examiner: MotionExaminer | None = None) -> MotionReport:
+        """What is found of the motion as it was written.
+
+        Args:
+            clip: what was read of it.
+            examiner: of the robot, and of options without a cut-off.
+        """
+        options = replace(self.options, cutoff=None)
+        examiner = examiner or make_examiner(self.robot, options, sensitivity=False)
+        marked = replace(clip, exact=True)  # CSV is so when the summary is there
         return examine(marked, self.robot, options, examiner, self.repair.recorded.schedule)
+
+    def _arguments(self) -> dict[str, Any]:
+        """Of :func:`write_motion`."""
+        after = self.repair.after
+        forces = {
+            contact.name: contact.wrench[:, : 3 if is_point(self.robot, contact.name) else 6]
+            for contact in after.analysis.contacts
+        }
+        return {
+            "q": self.repair.recorded.q,
+            "schedule": after.schedule,
+            "forces": forces,
+            "stretch": self.repair.stretch,
+        }
 
     def save(
         self,
@@ -202,11 +226,7 @@ def repair(
     Raises:
         DynacomError, ValueError: as :func:`analyze`; a clip of fewer than four frames.
     """
-    options = AnalysisOptions() if options is None else copy.deepcopy(options)
-    if balance_only:
-        options.repair.feet = options.repair.joints = False
-    if strict:
-        options.ladder.strict = True
+    options = repair_options(options, balance_only=balance_only, strict=strict)
     if stretch is not None:
         options.ladder.largest_stretch = stretch
     options.validate()
@@ -216,6 +236,18 @@ def repair(
         motion = read_motion(motion, robot, fps=fps, quat=quat, trust=trust, clip=clip)
     repairer = make_repairer(robot, options, threads=threads, progress=progress)
     return repair_clip(motion, robot, options, repairer, schedule)
+
+
+def repair_options(
+    options: AnalysisOptions | None, *, balance_only: bool, strict: bool
+) -> AnalysisOptions:
+    """A copy of the options, or of their defaults, with what :func:`repair` was asked for."""
+    options = AnalysisOptions() if options is None else copy.deepcopy(options)
+    if balance_only:
+        options.repair.feet = options.repair.joints = False
+    if strict:
+        options.ladder.strict = True
+    return options
 
 
 def make_repairer(robot: Robot, options: AnalysisOptions, **others: Any) -> MotionRepairer:
@@ -264,6 +296,14 @@ def repair_clip(
         )
         after = MotionReport(repaired, robot, options, found.after, schedule_text)
     return RepairReport(clip, robot, options, found, before, after)
+
+
+def different_text(written: MotionReport) -> str:
+    """What is to be said of a motion whose verdict is another one as it was written."""
+    return (
+        f"The motion is {written.verdict.outcome} ({', '.join(written.verdict.codes)}) as it was "
+        "written: its file cannot hold all that was changed."
+    )
 
 
 def _written(report: MotionReport) -> dict[str, Any]:

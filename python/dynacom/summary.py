@@ -215,8 +215,18 @@ def overview_table(found: "Overview", state: "BatchProgress") -> Table:
     for code, count in found.codes.most_common():
         if count:
             table.add_row(code, share(count))
+    if found.repairs:
+        table.add_section()
+        table.add_row("Repair", "")
+        for outcome, count in found.outcomes.items():
+            table.add_row(f"  {outcome}", share(count))
+        table.add_row("  errors", share(found.repair_errors))
+        for code, count in found.repair_codes.most_common():
+            table.add_row(f"  {code}", f"left in {share(count)}")
     table.add_section()
     table.add_row("Motion", f"{found.duration:.1f} s, {found.frames} frames")
+    for ground in found.grounds[:5]:
+        table.add_row("Ground", escape(ground.text()))
     if state.known:
         table.add_row("Known before", f"{state.known} of {state.files} files")
     for row in found.failed[:5]:

@@ -4,6 +4,7 @@
 import gzip
 import os
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pyarrow
 
 from dynacom.robots import Robot
 from helpers import WALKS
+from motion_files import columns_of, write_columns
 
 #: Contents of broken files by name -> a part of the error.
 BROKEN = {
@@ -43,6 +45,79 @@ def cut(path: Path, start: int, frames: int, walk: str = "anymal_walk", **change
 def hover(path: Path, start: int, frames: int) -> Path:
     """As cut, but no contact is ever active: not feasible."""
     return cut(path, start, frames, contacts=np.zeros((frames, 4), dtype=bool))
+
+
+def hurry(path: Path, start: int, frames: int) -> Path:
+    """A piece of the trot at twice its pace: not feasible, but it can be repaired."""
+    with np.load(WALKS / "anymal_trot.npz") as file:
+        time = file["t"][start : start + frames] / 2.0
+    return cut(path, start, frames, "anymal_trot", t=time, v=None, a=None)
+
+
+def write_without_legs(path: Path, talos: Robot) -> Robot:
+    """A file without the legs, which repair has to move: feet slide without them.
+
+    Returns:
+        The robot, whose legs are by default where the file needs them.
+    """
+    with np.load(WALKS / "talos_walk.npz") as file:
+        still = np.tile(file["q"][0], (100, 1))
+    columns = {
+        name: values
+        for name, values in columns_of(talos, still).items()
+        if not name.startswith("leg_")
+    }
+    columns = {"t": np.arange(100) / 50.0} | columns
+    # The trunk turns faster than soles allow.
+    columns["torso_1_joint"] = 0.6 * np.sin(2.0 * np.pi * 1.5 * np.arange(100) / 50.0)
+    columns["arm_left_2_joint"] = 0.8 + 0.5 * np.sin(2.0 * np.pi * 2.5 * np.arange(100) / 50.0)
+    write_columns(path, columns)
+    return replace(talos, default=still[0])
+
+
+def write_csv(path: Path, robot: Robot, walk: str, rate: float) -> Path:
+    """A piece of a bundled walk at so many frames a second; 50 are its own."""
+    with np.load(WALKS / f"{walk}.npz") as file:
+        q = file["q"][40:80]
+    return write_columns(path, {"t": np.arange(len(q)) / rate} | columns_of(robot, q))
+
+
+def write_repairable(folder: Path, robot: Robot) -> dict[str, str]:
+    """Clips for repair, and files that are none.
+
+    Returns:
+        Where each file lies -> what becomes of it, or of its clips, with + between them.
+    """
+    (folder / "sub").mkdir(parents=True)
+    cut(folder / "calm.npz", 0, 30)
+    hurry(folder / "sub" / "fast.npz", 20, 50)
+    hover(folder / "sub" / "air.npz", 0, 40)
+    cut(folder / "short.npz", 100, 3, v=None, a=None)
+    write_csv(folder / "calm.csv", robot, "anymal_walk", 50.0)
+    write_csv(folder / "fast.csv", robot, "anymal_trot", 100.0)
+    calm, fast = motion(robot, 20, 40), motion(robot, 20, 40) | {"fps": 150.0}
+    rising = motion(robot, 20, 40)
+    rising["root_pos"] = rising["root_pos"] + np.outer(np.arange(40), [0.0, 0.0, 0.02])
+    broken = motion(robot, 0, 5) | {"root_rot": np.zeros((5, 4))}
+    clips = {"calm": calm, "fast": fast, "rising": rising, "broken": broken}
+    (folder / "many.pkl").write_bytes(pickle.dumps(clips))
+    (folder / "calm.pkl").write_bytes(pickle.dumps({"one": calm, "two": motion(robot, 60, 40)}))
+    (folder / "fast.pkl").write_bytes(pickle.dumps(fast))
+    (folder / "rising.pkl").write_bytes(pickle.dumps({"one": rising, "two": broken}))
+    (folder / "broken.csv").touch()
+    return {
+        "broken.csv": "error",
+        "calm.csv": "feasible",
+        "calm.npz": "feasible",
+        "calm.pkl": "feasible+feasible",
+        "fast.csv": "repaired",
+        "fast.pkl": "repaired",
+        "many.pkl": "feasible+repaired+not repaired+error",
+        "rising.pkl": "not repaired+error",
+        "short.npz": "not repaired",
+        "sub/air.npz": "not repaired",
+        "sub/fast.npz": "repaired",
+    }
 
 
 def write_clips(folder: Path) -> dict[str, str]:

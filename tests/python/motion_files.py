@@ -82,6 +82,13 @@ class Sway(NamedTuple):
         return dict(zip(names, np.column_stack([self.time, self.table]).T, strict=True))
 
 
+def columns_of(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
+    """The columns of CSV with a header."""
+    model = robot.model
+    joints = {name: q[:, model.joints[model.getJointId(name)].idx_q] for name in robot.joints.names}
+    return dict(zip(ROOT, q[:, :7].T, strict=True)) | joints
+
+
 def sway(robot: Robot, frames: int = 90) -> Sway:
     time = np.arange(frames) / 60.0
     phase = time[:, None]

@@ -23,8 +23,9 @@ import dynacom
 from batch_clips import cut, hover, motion, same, write_clips, write_program
 from dynacom import DynacomError, batch_overview, batch_pool, batch_store
 from dynacom.batch_files import find_motions
+from dynacom.batch_judge import error_row
 from dynacom.batch_pool import Task
-from dynacom.batch_row import Job, error_row
+from dynacom.batch_row import Job
 from dynacom.batch_store import Store
 from dynacom.motion_report import FAULTS
 from dynacom.summary import summary_table

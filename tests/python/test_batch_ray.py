@@ -13,7 +13,7 @@ import pyarrow.parquet
 import pytest
 
 import dynacom
-from batch_clips import cut, same, write_clips, write_program
+from batch_clips import cut, same, write_clips, write_program, write_repairable
 from dynacom import DynacomError
 
 ROBOT = "anymal_c"
@@ -64,6 +64,21 @@ def test_options_reach_actors(ray, tmp_path):
         options = dynacom.AnalysisOptions(distance=distance)
         table = dynacom.batch(clip, ROBOT, engine="ray", jobs=1, options=options)
         assert (table["distance_rms"][0].as_py() is not None) == distance
+
+
+def test_repair_is_that_of_local(ray, tmp_path, anymal):
+    folder = tmp_path / "clips"
+    write_repairable(folder, anymal)
+    tables, trees = [], []
+    for engine in ("local", "ray"):
+        out = tmp_path / engine
+        tables.append(dynacom.batch(folder, anymal, out=out, engine=engine, jobs=2, repair=True))
+        repaired = out / "repaired"
+        files = (path for path in repaired.rglob("*") if path.is_file())
+        trees.append({path.relative_to(repaired): path.read_bytes() for path in files})
+    assert same(*tables)
+    assert trees[0] == trees[1]
+    assert len(trees[0]) > 5
 
 
 def test_an_actor_is_killed(ray, tmp_path, anymal):

@@ -752,11 +752,11 @@ def test_one_of_several_clips(tmp_path, toy):
 
 def test_batches_know_which_clip_it_was(tmp_path, toy):
     from dynacom.motion_clip import Options
-    from dynacom.motion_pickle import read_clips
+    from dynacom.motion_pickle import PickleFile
 
     content = {name: clip_of(toy) for name in ("a", "b")}
     path = dump(tmp_path / "motion.pkl", content)
-    for name, make in read_clips(path, toy, Options()):
+    for name, make in PickleFile(path, Options()).clips(toy):
         assert make().options.clip == name
 
 

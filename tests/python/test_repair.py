@@ -13,20 +13,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import dynacom
+from batch_clips import write_without_legs
 from dynacom import AnalysisOptions, DynacomError, LadderSettings, RepairReport
 from dynacom.contacts_file import contact_arrays
 from dynacom.robots import Robot
 from helpers import WALKS
-from motion_files import ROOT
+from motion_files import columns_of
 
 BY_DEFAULT = ["frames.parquet", "schedule.yaml", "summary.json"]
-
-
-def columns_of(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
-    """The columns of CSV with a header."""
-    model = robot.model
-    joints = {name: q[:, model.joints[model.getJointId(name)].idx_q] for name in robot.joints.names}
-    return dict(zip(ROOT, q[:, :7].T, strict=True)) | joints
 
 
 def write_walk(path: Path, robot: Robot, factor: float, frames: slice = slice(None)) -> Path:
@@ -465,21 +459,8 @@ def test_forces_in_the_file_are_those_of_the_new_motion(talos, tmp_path):
 
 
 def test_what_the_file_cannot_hold_is_told(talos, tmp_path):
-    """A file without the legs, which repair has to move, keeps feet that slide without them."""
     path = tmp_path / "walk.csv"
-    with np.load(WALKS / "talos_walk.npz") as file:
-        still = np.tile(file["q"][0], (100, 1))
-    # The trunk turns faster than soles allow; the legs are at their default.
-    robot = replace(talos, default=still[0])
-    columns = {
-        name: values
-        for name, values in columns_of(talos, still).items()
-        if not name.startswith("leg_")
-    }
-    columns["torso_1_joint"] = 0.6 * np.sin(2.0 * np.pi * 1.5 * np.arange(100) / 50.0)
-    columns["arm_left_2_joint"] = 0.8 + 0.5 * np.sin(2.0 * np.pi * 2.5 * np.arange(100) / 50.0)
-    table = np.column_stack([*columns.values()])
-    np.savetxt(path, table, "%.9f", ",", header=",".join(columns), comments="")
+    robot = write_without_legs(path, talos)
     report = dynacom.repair(path, robot, fps=50.0)
     assert report.outcome == "repaired"
     report.save(tmp_path / "out", page=False)
