@@ -22,7 +22,7 @@ struct DYNACOM_EXPORT RepairerSettings {
   bool strict = false;
   /// How often a motion is repaired at most, with the contacts that are found in what came out, on
   /// each rung.
-  int rounds = 3;
+  int rounds = 5;
   /// A motion whose root has to be displaced farther than this in any frame [m], or a joint turned
   /// by more than the second [rad], is not said to be repaired.
   double largest_displacement = 0.1, largest_turn = 0.8;
