@@ -32,7 +32,6 @@ const char* getMeaning(const std::string& field) {
       {"feet", "Whether contacts stand still, level with their ground, and parts keep above it"},
       {"joints", "Whether joints keep within their positions and velocities"},
       {"pinned_ends", "Whether the first and the last configuration stay as they are"},
-      {"anew", "Whether all is found anew although a start is given, or what is out of reach only"},
       {"window", "Longer motions are repaired in windows of this length [s]"},
       {"overlap", "Windows find so much beyond their end, which the next one finds anew [s]"},
   };
@@ -73,14 +72,14 @@ RepairGround findGround(const PartRobot& parts, const ContactInference& inferenc
 
 RepairedMotion repair(const PartRobot& parts, const Motion& motion, const ContactSchedule& schedule,
                       const Settings& settings, const bp::object& free, const RepairGround& ground,
-                      const bp::object& start) {
+                      const bp::object& start, bool anew) {
   Eigen::Array<bool, Eigen::Dynamic, 1> free_frames;
   if (!free.is_none())
     free_frames = bp::extract<Eigen::Matrix<bool, Eigen::Dynamic, 1>>(free)().array();
   Eigen::MatrixXd first;
   if (!start.is_none()) first = bp::extract<Eigen::MatrixXd>(start)().transpose();
   const WithoutLock unlocked;
-  return repairMotion(parts, motion, schedule, settings, free_frames, ground, first);
+  return repairMotion(parts, motion, schedule, settings, free_frames, ground, first, anew);
 }
 
 }  // namespace
@@ -155,7 +154,7 @@ void exposeMotionRepair() {
       "repairMotion", &repair,
       (bp::arg("parts"), bp::arg("motion"), bp::arg("schedule"), bp::arg("settings") = Settings(),
        bp::arg("free") = bp::object(), bp::arg("ground") = RepairGround(),
-       bp::arg("start") = bp::object()),
+       bp::arg("start") = bp::object(), bp::arg("anew") = true),
       "The RepairedMotion: the smallest change d(t) of a motion's configurations after which\n"
       "contacts can give the wrench of each frame, of the derivatives that differentiate()\n"
       "gives it. Minimises the integral of |d|^2, |d''|^2 and of how far active parts are from\n"
@@ -165,7 +164,9 @@ void exposeMotionRepair() {
       "free: (T,), frames of whose wrench nothing is asked; ground: its height under each part, "
       "as\n"
       "ContactInference.ground, (T, parts) [m], NaN where it is not known, and ground_velocity, a\n"
-      "treadmill's [m/s]; start: configurations with which the search begins, (T, nq). A motion\n"
+      "treadmill's [m/s]; anew: whether all is\n"
+      "found anew although a start is given, or only what is out of reach mended; start: "
+      "configurations with which the search begins, (T, nq). A motion\n"
       "within reach and limits, whose parts are within a millimetre of where they are to be, "
       "comes\n"
       "back as it is. Raises ValueError if settings or the motion are not valid, the\n"

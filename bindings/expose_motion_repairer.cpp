@@ -88,7 +88,7 @@ void exposeMotionRepairer() {
   bp::class_<RepairReason>("RepairReason", "Why a motion is not repaired.", bp::no_init)
       .def_readonly("code", &RepairReason::code,
                     "What is left: a fault's, or 'contact_needed', 'out_of_reach',\n"
-                    "'joint_limits', 'bound' or 'too_short'")
+                    "'joint_limits', 'bound', 'not_better' or 'too_short'")
       .def_readonly("time", &RepairReason::time,
                     "Where it is worst [s]; NaN where it is of no frame")
       .def_readonly("text", &RepairReason::text, "In words")
@@ -106,6 +106,10 @@ void exposeMotionRepairer() {
       .add_property("change", &Rows<&MotionRepair::change>::get,
                     "Of the configurations, from those of before, (T, nv)")
       .def_readonly("root", &MotionRepair::root, "RepairChange of the root's place [m]")
+      .def_readonly("turn", &MotionRepair::turn, "RepairChange of the root's orientation [rad]")
+      .def_readonly("joint_excess_before", &MotionRepair::joint_excess_before,
+                    "How far a joint was beyond its limits at most, or a step of it [rad]")
+      .def_readonly("joint_excess", &MotionRepair::joint_excess, "How far one is now [rad]")
       .def_readonly("joints", &MotionRepair::joints, "RepairChange of joints that turn [rad]")
       .def_readonly("com", &MotionRepair::com, "RepairChange of the CoM's place [m]")
       .def_readonly("missing_before", &MotionRepair::missing_before,

@@ -281,10 +281,8 @@ BOOST_AUTO_TEST_CASE(what_begins_near_the_end_is_only_mended) {
   // One frame is pushed off, and found back; far from it nothing moves.
   Eigen::MatrixXd start = repaired.motion.q;
   start(0, 75) += 0.0003;
-  RepairSettings settings;
-  settings.anew = false;
   const RepairedMotion mended =
-      repairMotion(*walker.split, motion, schedule, settings, {}, {}, start);
+      repairMotion(*walker.split, motion, schedule, {}, {}, {}, start, false);
   BOOST_TEST(mended.within_reach);
   BOOST_TEST((mended.motion.q.leftCols(40) == start.leftCols(40)));
   BOOST_TEST((mended.motion.q.rightCols(40) == start.rightCols(40)));

@@ -42,8 +42,6 @@ struct DYNACOM_EXPORT RepairSettings {
   /// whether joints keep within their positions and velocities; and whether the first and the last
   /// configuration stay as they are.
   bool feet = true, joints = true, pinned_ends = false;
-  /// Whether all is found anew although a start is given; else only what is out of reach there.
-  bool anew = true;
 
   using Field = std::pair<const char*, double RepairSettings::*>;
   using Switch = std::pair<const char*, bool RepairSettings::*>;
@@ -137,6 +135,8 @@ struct DYNACOM_EXPORT RepairedMotion {
 /// @param ground    that parts stand on
 /// @param start     configurations with which the search begins, nq × frames; the motion's own if
 ///                  empty
+/// @param anew      whether all is found anew although a start is given; else only what is out of
+///                  reach there is mended
 /// @throws std::invalid_argument if settings or the motion are not valid, the root is another, the
 ///         schedule names a part that there is not, sizes differ, there are more than 32 parts, or
 ///         what a frame needs is too large for numbers
@@ -145,6 +145,6 @@ DYNACOM_EXPORT RepairedMotion repairMotion(const PartRobot& parts, const Motion&
                                            const RepairSettings& settings = {},
                                            const Eigen::Array<bool, Eigen::Dynamic, 1>& free = {},
                                            const RepairGround& ground = {},
-                                           const Eigen::MatrixXd& start = {});
+                                           const Eigen::MatrixXd& start = {}, bool anew = true);
 
 }  // namespace dynacom

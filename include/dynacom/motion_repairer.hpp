@@ -58,7 +58,8 @@ enum class RepairRung {
 DYNACOM_EXPORT const char* to_string(RepairRung rung);
 
 /// What a rung has gained. What is measured is for Ground the height of what is stood on above the
-/// ground [m]; for Filter and Schedule the distance to a feasible
+/// ground [m]; for Filter the root's displacement by it, root mean square
+/// [m], for Schedule the distance to a feasible
 /// motion, root mean square [m], where it is known, else NaN; for Balance the number of frames
 /// whose wrench is not within reach; for Feet the largest speed of a contact along the ground
 /// [m/s]; for Joints how far one is beyond its range at most [rad]; for Time the factor.
@@ -94,7 +95,11 @@ struct MotionRepair {
   MotionExamination filtered;  ///< as who does not know that it is exact finds it
   /// Of the configurations, from those of `before` in their tangent spaces, nv × frames.
   Eigen::MatrixXd change;
-  RepairChange root, joints, com;  ///< displacements [m], changes of joints that turn [rad]
+  RepairChange root, com;     ///< displacements [m]
+  RepairChange turn, joints;  ///< of the root, and changes of joints that turn [rad]
+  /// How far a joint is beyond its limits at most, or a step of it, in what `before` has and in
+  /// what came out [rad], [m].
+  double joint_excess_before = 0., joint_excess = 0.;
   /// How many of the judged frames contacts cannot give what they need, by more than 0.001 m g or
   /// m g m.
   Eigen::Index missing_before = 0, missing = 0;
@@ -104,7 +109,8 @@ struct MotionRepair {
   std::vector<RepairStep> steps;
   /// Of `Repaired` and `Feasible` none. Codes are those of faults, and `contact_needed` where
   /// nothing carries, `out_of_reach` where what carries cannot give what is needed,
-  /// `joint_limits`, `bound` where settings do not allow so much, and `too_short`.
+  /// `joint_limits`, `bound` where settings do not allow so much, `not_better` where all that was
+  /// tried is worse, and the motion stays as it was, and `too_short`.
   std::vector<RepairReason> reasons;
 };
 
@@ -119,8 +125,8 @@ struct MotionRepair {
 class DYNACOM_EXPORT MotionRepairer {
  public:
   /// @param robot  is copied; its root must be a free-flyer
-  /// @throws std::invalid_argument if settings are not valid; NotReadyError before the robot's
-  ///         initialize()
+  /// @throws std::invalid_argument if settings are not valid, or the root is no free-flyer;
+  ///         NotReadyError before the robot's initialize()
   explicit MotionRepairer(const DynaCoM& robot, const RepairerSettings& settings = {});
   MotionRepairer(MotionRepairer&&) noexcept;
   MotionRepairer& operator=(MotionRepairer&&) noexcept;

@@ -16,7 +16,7 @@ A settings file is YAML; what it does not name stays at its default::
       residual_force: {limit: 0.1, allowed_share: 0.05}
       minimal_window: 1.0
     repair:               # RepairSettings, field by field: what changes cost, and what is mended
-      displacement: 0.01  # [m]
+      displacement: 0.005  # [m]
       feet: true
     ladder:               # LadderSettings, field by field: how far repair goes
       largest_displacement: 0.1 # [m]
@@ -63,7 +63,7 @@ class LadderSettings:
         strict: whether single frames are mended, too, of motions that are feasible as a whole.
     """
 
-    rounds: int = 3
+    rounds: int = 5
     largest_displacement: float = 0.1
     largest_turn: float = 0.8
     largest_stretch: float = 1.0

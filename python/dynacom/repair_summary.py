@@ -15,6 +15,21 @@ from dynacom.dynacom_pywrap import (
 from dynacom.robots import Robot
 
 
+# What may help against what is left.
+_HINTS = {
+    "foot_sliding": "feet that slide in earnest need another motion; repair.largest_drift and "
+    "repair.largest_shift say how far they may be moved",
+    "contact_needed": "a contact may be missing that --schedule can tell, or time may be stretched",
+    "out_of_reach": "time may be stretched (--stretch), or a contact is missing (--schedule)",
+    "bound": "time may be stretched (--stretch); ladder.largest_displacement and "
+    "ladder.largest_turn say how much is allowed",
+    "ground_penetration": "the height of the ground may be told (--ground-height)",
+    "joint_limits": "the joints may be in another order than the file's: see the notes",
+    "discontinuity": "the clip may be cut there",
+    "downward_normal": "the contacts of the robot's file may be turned",
+}
+
+
 def repair_summary(robot: Robot, repair: MotionRepair) -> dict[str, Any]:
     """The entry, see docs/repair.md, but for the file that the motion is written to."""
     before, after = repair.before, repair.after
@@ -27,14 +42,21 @@ def repair_summary(robot: Robot, repair: MotionRepair) -> dict[str, Any]:
         "missing_before": _missing(before, repair.missing_before),
         "missing": _missing(after, repair.missing),
         "stretch": repair.stretch,
+        "ground_offset": repair.ground_offset,
         "root": _change(repair, repair.root),
+        "turn": _change(repair, repair.turn),
         "joints": _change(repair, repair.joints) | {"joint": repair.joints.joint or None},
         "com": _change(repair, repair.com),
         "stances": _stances(robot, repair),
-        "limits": _limits(rungs),
+        "limits": {"before": repair.joint_excess_before, "after": repair.joint_excess},
         "rungs": rungs,
         "reasons": [
-            {"code": reason.code, "time": reason.time, "text": reason.text}
+            {
+                "code": reason.code,
+                "time": reason.time,
+                "text": reason.text,
+                "hint": _HINTS.get(reason.code),
+            }
             for reason in repair.reasons
         ],
     }
@@ -102,14 +124,6 @@ def _drift(repair: MotionRepair, found: MotionExamination, stance: Any) -> float
 # Steps.
 
 
-def _limits(rungs: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """How far joints were beyond their limits, and are; None where that was not looked at."""
-    rung = next((rung for rung in rungs if rung["name"] == "joints"), None)
-    if rung is None:
-        return None
-    return {"before": rung["before"], "after": rung["after" if rung["kept"] else "before"]}
-
-
 def _rung(step: RepairStep, before: MotionExamination) -> dict[str, Any]:
     counts = {}
     if step.rung == "balance":
@@ -137,7 +151,7 @@ def _rung_texts(step: RepairStep, before: MotionExamination) -> Iterator[str]:
     elif step.rung == "filter":
         yield (
             f"The motion was filtered at {before.derived.cutoff:g} Hz, which moved the root by "
-            f"{1e3 * step.after:.2g} mm (RMS)."
+            f"{_millimetres(step.after)} (RMS)."
         )
     elif step.rung == "schedule":
         yield (
@@ -146,18 +160,18 @@ def _rung_texts(step: RepairStep, before: MotionExamination) -> Iterator[str]:
         )
     elif step.rung == "balance":
         yield (
-            f"Wrenches were brought within reach: {step.after:.0f} frames are out of reach, and "
-            f"{step.before:.0f} were."
+            f"Wrenches were to be brought within reach: {step.after:.0f} frames are out of reach, "
+            f"and {step.before:.0f} were before."
         )
     elif step.rung == "feet":
         yield (
-            "Contacts were held still and level with their ground: they slide by up to "
-            f"{step.after:.3g} m/s, and did by {step.before:.3g} m/s."
+            "Contacts were to stand still, or slide slowly, level with their ground: they slide by "
+            f"up to {1e3 * step.after:.0f} mm/s, and did by {1e3 * step.before:.0f} mm/s."
         )
     elif step.rung == "joints":
         yield (
-            "Joints were brought within their limits: one is up to "
-            f"{np.degrees(step.after):.2g}° beyond, and was {np.degrees(step.before):.2g}°."
+            "Joints were to keep within their limits: one is up to "
+            f"{np.degrees(step.after):.1f}° beyond, and was {np.degrees(step.before):.1f}°."
         )
     else:
         yield f"Time was stretched by a factor of {step.after:g}."
@@ -166,4 +180,4 @@ def _rung_texts(step: RepairStep, before: MotionExamination) -> Iterator[str]:
 
 
 def _millimetres(value: float) -> str:
-    return "not known" if np.isnan(value) else f"{1e3 * value:.2g} mm"
+    return "not known" if np.isnan(value) else f"{1e3 * value:.{1 if value < 0.01 else 0}f} mm"

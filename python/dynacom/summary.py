@@ -96,6 +96,8 @@ def repair_table(summary: dict[str, Any]) -> Table:
     for reason in repair["reasons"]:
         when = "" if reason["time"] is None else f" (at {reason['time']:.2f} s)"
         table.add_row(f"  {reason['code']}", escape(f"{reason['text']}{when}"))
+        if reason.get("hint"):
+            table.add_row("", escape(f"What may help: {reason['hint']}"))
     table.add_section()
     verdicts = [_verdict_text(repair, ending) for ending in ("_before", "")]
     table.add_row("Verdict", " → ".join(verdicts))
@@ -110,6 +112,7 @@ def repair_table(summary: dict[str, Any]) -> Table:
     for key, title, text in (
         ("root", "Root displaced", _millimetres),
         ("com", "Centre of mass displaced", _millimetres),
+        ("turn", "Root turned", _degrees),
         ("joints", "Joints turned", _degrees),
     ):
         change = repair[key]
@@ -119,6 +122,8 @@ def repair_table(summary: dict[str, Any]) -> Table:
             f"{text(change['rms'])} (RMS), up to {text(change['largest'])} "
             f"({escape(what)}at {change['time']:.2f} s)",
         )
+    if repair["ground_offset"] != 0.0:
+        table.add_row("Lifted to the ground", f"by {_millimetres(repair['ground_offset'])}")
     if repair["stretch"] != 1.0:
         table.add_row("Time stretched", f"by a factor of {repair['stretch']:g}")
     table.add_section()
@@ -144,7 +149,8 @@ def _compared(repair: dict[str, Any], frames: int) -> Iterator[tuple[str, list[s
     ):
         values = [repair["stances"][f"{key}{ending}"] for ending in ("_before", "")]
         yield title, [_millimetres(value, unit) for value in values]
-    if limits := repair["limits"]:
+    limits = repair["limits"]
+    if any(limits.values()):
         yield "Joints beyond limits by", [_degrees(limits[key]) for key in ("before", "after")]
 
 
@@ -163,7 +169,7 @@ def _millimetres(value: float | None, unit: str = "mm") -> str:
 
 
 def _degrees(value: float | None) -> str:
-    return "–" if value is None else f"{math.degrees(value):.2g}°"
+    return "–" if value is None else f"{math.degrees(value):.{1 if value > 0.1 else 2}f}°"
 
 
 def _add_notes(table: Table, notes: list[str]) -> None:

@@ -26,15 +26,15 @@ std::vector<LimitedJoint> listLimits(const pinocchio::Model& model, double posit
                             model.upperVelocityLimit[joint.idx_v()],
                             0.,
                             0.};
-    const double range = limited.upper - limited.lower;
-    if (range > 0. && std::abs(limited.lower) < kHuge && std::abs(limited.upper) < kHuge) {
-      limited.position_margin = std::min(position_margin, 0.5 * range);
-      limited.lower += limited.position_margin;
-      limited.upper -= limited.position_margin;
-    } else {
-      limited.lower = -kNone;
-      limited.upper = kNone;
-    }
+    const bool is_lowered = std::abs(limited.lower) < kHuge,
+               is_raised = std::abs(limited.upper) < kHuge;
+    // Where both are the same number, there is no range, as in descriptions without limits.
+    const bool is_range = limited.upper > limited.lower;
+    limited.position_margin = is_lowered && is_raised
+                                  ? std::min(position_margin, 0.5 * (limited.upper - limited.lower))
+                                  : position_margin;
+    limited.lower = is_range && is_lowered ? limited.lower + limited.position_margin : -kNone;
+    limited.upper = is_range && is_raised ? limited.upper - limited.position_margin : kNone;
     if (limited.speed > 0. && limited.speed < kHuge) {
       limited.speed_margin = speed_margin * limited.speed;
       limited.speed -= limited.speed_margin;

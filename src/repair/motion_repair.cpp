@@ -51,7 +51,6 @@ const std::vector<RepairSettings::Switch>& RepairSettings::switches() {
       {"feet", &RepairSettings::feet},
       {"joints", &RepairSettings::joints},
       {"pinned_ends", &RepairSettings::pinned_ends},
-      {"anew", &RepairSettings::anew},
   };
   return all;
 }
@@ -115,24 +114,6 @@ Eigen::VectorXd listCosts(const pinocchio::Model& model, double linear, double a
   const Eigen::VectorXd scale = internal::findSliding(model).select(
       Eigen::VectorXd::Constant(nv, linear), Eigen::VectorXd::Constant(nv, angular));
   return scale.array().square().inverse();
-}
-
-// The mean of placements, without those in which fewer parts carry than in others.
-pinocchio::SE3 average(const std::vector<pinocchio::SE3>& placements,
-                       const std::vector<std::uint32_t>& carrying) {
-  int most = 0;
-  for (const std::uint32_t set : carrying) most = std::max(most, __builtin_popcount(set));
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();
-  Eigen::Vector4d rotation = Eigen::Vector4d::Zero();
-  double count = 0.;
-  for (std::size_t k = 0; k < placements.size(); ++k) {
-    if (__builtin_popcount(carrying[k]) < most) continue;
-    const Eigen::Vector4d own = Eigen::Quaterniond(placements[k].rotation()).coeffs();
-    rotation += own.dot(rotation) < 0. ? Eigen::Vector4d(-own) : own;
-    place += placements[k].translation();
-    ++count;
-  }
-  return {Eigen::Quaterniond(Eigen::Vector4d(rotation.normalized())), place / count};
 }
 
 // Where the parts of each contact are, and are to be, while they carry.
@@ -271,6 +252,33 @@ class Footwork {
     return levelled;
   }
 
+  // The mean of a contact's placements, without those in which fewer parts carry than in others:
+  // the mean rotation, and the parts that carry where they are on average.
+  pinocchio::SE3 average(const std::vector<pinocchio::SE3>& placements,
+                         const std::vector<std::uint32_t>& carrying, Index first) const {
+    int most = 0;
+    for (const std::uint32_t set : carrying) most = std::max(most, __builtin_popcount(set));
+    const auto forEach = [&](const auto& act) {
+      for (std::size_t k = 0; k < carrying.size(); ++k)
+        if (__builtin_popcount(carrying[k]) == most)
+          act(placements[std::size_t(first) + k], carrying[k]);
+    };
+    Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+    forEach([&](const pinocchio::SE3& placement, std::uint32_t) {
+      const Eigen::Vector4d own = Eigen::Quaterniond(placement.rotation()).coeffs();
+      sum += own.dot(sum) < 0. ? Eigen::Vector4d(-own) : own;
+    });
+    const pinocchio::SE3 turned(Eigen::Quaterniond(Eigen::Vector4d(sum.normalized())),
+                                Eigen::Vector3d::Zero());
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+    double count = 0.;
+    forEach([&](const pinocchio::SE3& placement, std::uint32_t set) {
+      place += centre(set, placement) - centre(set, turned);
+      ++count;
+    });
+    return {turned.rotation(), place / count};
+  }
+
   // Where parts are on average with a placement.
   Eigen::Vector3d centre(std::uint32_t parts, const pinocchio::SE3& placement) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -379,8 +387,7 @@ class Footwork {
     const auto& placements = placements_[first_part];
     std::vector<std::uint32_t> carrying;
     for (Index frame = first; frame < behind; ++frame) carrying.push_back(setOf(frame) & mask);
-    const pinocchio::SE3 mean =
-        average({placements.begin() + first, placements.begin() + behind}, carrying);
+    const pinocchio::SE3 mean = average(placements, carrying, first);
     RepairedStance stance = {contact, first, behind, 0., false};
     const auto forEachCarrying = [&](const auto& act) {
       for (Index frame = first; frame < behind; ++frame)
@@ -531,7 +538,7 @@ void summarize(const pinocchio::Model& model, RepairedMotion& found) {
 RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
                             const ContactSchedule& schedule, const RepairSettings& settings,
                             const Eigen::Array<bool, Eigen::Dynamic, 1>& free,
-                            const RepairGround& ground, const Eigen::MatrixXd& start) {
+                            const RepairGround& ground, const Eigen::MatrixXd& start, bool anew) {
   settings.validate();
   const pinocchio::Model& model = parts.robot.getModel();
   const Index frames = motion.time.size();
@@ -578,8 +585,8 @@ RepairedMotion repairMotion(const PartRobot& parts, const Motion& motion,
   if (worst > kReach || std::max(found.held_largest, found.sunk_largest) > kPlace ||
       are_joints_wrong) {
     const bool is_new = start.size() == 0;
-    repairInWindows(problem, settings, is_new ? motion.q : start, !is_new && !settings.anew,
-                    found.change, q);
+    repairInWindows(problem, settings, is_new ? motion.q : start, !is_new && !anew, found.change,
+                    q);
     worst = measure(problem, settings.feet ? ground.height : Eigen::MatrixXd(), q, found);
     measureJoints(problem, q, found);
   } else {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "../check.hpp"
+#include "../motion_check.hpp"
 #include "../nan.hpp"
 #include "joint_limits.hpp"
 #include "motion_linearization.hpp"
@@ -56,6 +57,9 @@ constexpr double kGiven = 1e-3;
 constexpr double kFarther = 1.5, kFartherBy = 0.003;
 // Joints that are no farther beyond their limits are within them: so much comes of rounding.
 constexpr double kWithinLimits = 1e-9;
+// A motion whose joints are accelerated so many times as much as before, and as one that is calm
+// [rad/s²], RMS, is worse.
+constexpr double kWilder = 3., kCalm = 1.;
 // By which factors time is stretched.
 constexpr double kStretches[] = {1.1, 1.25, 1.5, 2., 3., 4.};
 
@@ -137,27 +141,33 @@ struct MotionRepairer::Workspace {
 // One motion, at one pace.
 class MotionRepairer::Workspace::Ladder {
  public:
-  Ladder(const Workspace& workspace, const RecordedMotion& recorded, MotionExamination before)
-      : workspace_(workspace), settings_(workspace.settings), recorded_(recorded) {
+  // @param is_left  whether a motion that is feasible is left as it is
+  Ladder(const Workspace& workspace, const RecordedMotion& recorded, MotionExamination before,
+         bool is_left)
+      : workspace_(workspace),
+        settings_(workspace.settings),
+        recorded_(recorded),
+        is_left_(is_left) {
     found_.before = std::move(before);
     found_.missing_before = countMissing(found_.before);
   }
 
   MotionRepair climb() {
     const MotionOutcome outcome = found_.before.verdict.outcome;
-    const bool is_fine =
-        outcome == MotionOutcome::Feasible && !(settings_.strict && found_.missing_before > 0);
-    if (is_fine || outcome == MotionOutcome::Unknown) return leave();
+    const bool is_fine = is_left_ && outcome == MotionOutcome::Feasible &&
+                         !(settings_.strict && found_.missing_before > 0);
+    if (is_fine || outcome == MotionOutcome::Unknown) return std::move(leave());
     const Motion& origin = found_.before.derived.motion;
     if (found_.before.derived.cutoff > 0.) {
       const RepairChange moved = summarize((origin.q - recorded_.q).topRows<3>().colwise().norm());
       found_.steps.push_back({RepairRung::Filter, 0., moved.rms, true});
     }
-    const std::optional<MotionExamination> contacts = findContacts();
-    Attempt best = balance(contacts ? *contacts : found_.before);
-    if (settings_.repair.feet || settings_.repair.joints)
-      standAndLimit(contacts ? *contacts : found_.before, best);
-    finish(std::move(best));
+    const std::optional<MotionExamination> exact = findContacts();
+    const MotionExamination& contacts = exact ? *exact : found_.before;
+    std::optional<Attempt> best = balance(contacts);
+    if (settings_.repair.feet || settings_.repair.joints) standAndLimit(contacts, best);
+    if (!best) return giveUp();
+    finish(std::move(*best));
     return std::move(found_);
   }
 
@@ -175,7 +185,7 @@ class MotionRepairer::Workspace::Ladder {
   }
 
   // As it was.
-  MotionRepair leave() {
+  MotionRepair& leave() {
     found_.recorded = recorded_;
     found_.after = found_.filtered = found_.before;
     found_.change.setZero(model().nv, recorded_.time.size());
@@ -186,6 +196,17 @@ class MotionRepairer::Workspace::Ladder {
       found_.reasons.push_back(
           {"too_short", internal::kNaN, "there are too few frames whose accelerations are known"});
     }
+    found_.joint_excess_before = found_.joint_excess = findExcess(recorded_.q);
+    return found_;
+  }
+
+  // As it was, since all that was tried is worse.
+  MotionRepair giveUp() {
+    leave();
+    found_.outcome = RepairOutcome::NotRepaired;
+    explain();
+    found_.reasons.push_back({"not_better", internal::kNaN,
+                              "what was tried is worse than the motion as it was, which is kept"});
     return std::move(found_);
   }
 
@@ -203,34 +224,61 @@ class MotionRepairer::Workspace::Ladder {
     return exact;
   }
 
-  Attempt balance(const MotionExamination& contacts) {
+  // Wrenches alone; nothing where that makes the motion worse.
+  std::optional<Attempt> balance(const MotionExamination& contacts) {
     RepairSettings settings = settings_.repair;
     settings.feet = settings.joints = false;
     Attempt attempt = repeat(settings, contacts, found_.before.derived.motion.q);
+    const bool is_kept = !isWorse(attempt, found_.before, found_.missing_before);
     found_.steps.push_back(
-        {RepairRung::Balance, double(found_.missing_before), double(attempt.missing), true});
+        {RepairRung::Balance, double(found_.missing_before), double(attempt.missing), is_kept});
+    if (!is_kept) return std::nullopt;
     return attempt;
   }
 
   // Feet and joints, if something is wrong with them, and no wrench is lost for it. Where balance
   // alone has not led to where contacts are found again, feet that are level may.
-  void standAndLimit(const MotionExamination& contacts, Attempt& best) {
-    const double limits = findExcess(best.repaired.motion.q);
-    const bool are_limits_wrong = settings_.repair.joints && limits > kWithinLimits;
-    const bool are_feet_wrong = settings_.repair.feet && !best.found.verdict.isFeasible();
-    if (!are_limits_wrong && !are_feet_wrong) return;
-    const bool is_balanced = best.missing == 0;
-    Attempt attempt = repeat(settings_.repair, is_balanced ? best.found : contacts,
-                             is_balanced ? best.repaired.motion.q : found_.before.derived.motion.q);
-    const bool is_kept = attempt.missing <= best.missing && isSmall(attempt.repaired.change) &&
-                         rank(attempt.found.verdict.outcome) >= rank(best.found.verdict.outcome);
+  void standAndLimit(const MotionExamination& contacts, std::optional<Attempt>& best) {
+    const Eigen::MatrixXd& origin = found_.before.derived.motion.q;
+    const bool is_balanced = best && best->missing == 0;
+    const bool are_limits_wrong =
+        settings_.repair.joints &&
+        findExcess(best ? best->repaired.motion.q : origin) > kWithinLimits;
+    const bool are_feet_wrong =
+        settings_.repair.feet && !(best && best->found.verdict.isFeasible());
+    if (best && !are_limits_wrong && !are_feet_wrong) return;
+    Attempt attempt = repeat(settings_.repair, is_balanced ? best->found : contacts,
+                             is_balanced ? best->repaired.motion.q : origin);
+    const bool is_kept = isSmall(attempt.repaired.change) &&
+                         (best ? !isWorse(attempt, best->found, best->missing)
+                               : !isWorse(attempt, found_.before, found_.missing_before));
     if (settings_.repair.feet)
       found_.steps.push_back(
-          {RepairRung::Feet, findSlide(best.found), findSlide(attempt.found), is_kept});
+          {RepairRung::Feet, findSlide(found_.before), findSlide(attempt.found), is_kept});
     if (settings_.repair.joints)
       found_.steps.push_back(
-          {RepairRung::Joints, limits, findExcess(attempt.repaired.motion.q), is_kept});
+          {RepairRung::Joints, findExcess(origin), findExcess(attempt.repaired.motion.q), is_kept});
     if (is_kept) best = std::move(attempt);
+  }
+
+  // Whether something is lost against another motion: wrenches, the verdict, all contacts, or what
+  // was smooth.
+  bool isWorse(const Attempt& attempt, const MotionExamination& other, Index missing) const {
+    const MotionExamination& found = attempt.found;
+    const auto lackOf = [](const MotionExamination& some) {
+      return std::hypot(some.statistics.residual_force_rms, some.statistics.residual_torque_rms);
+    };
+    const auto carries = [](const MotionExamination& some) {
+      return some.inference.schedule.active.any();
+    };
+    const auto joltOf = [&](const MotionExamination& some) {
+      const auto joints = some.derived.motion.a.bottomRows(model().nv - 6);
+      return joints.size() == 0 ? 0. : std::sqrt(joints.squaredNorm() / double(joints.size()));
+    };
+    return attempt.missing > missing || lackOf(found) > lackOf(other) + kGiven ||
+           rank(found.verdict.outcome) < rank(other.verdict.outcome) ||
+           (carries(other) && !carries(found)) ||
+           joltOf(found) > kWilder * (joltOf(found_.before) + kCalm);
   }
 
   static double findSlide(const MotionExamination& found) {
@@ -253,7 +301,7 @@ class MotionRepairer::Workspace::Ladder {
 
   // Repairs with the contacts that were found. Where these are others then, and cannot give what is
   // needed, it does so once more with those, near such frames, and so on.
-  Attempt repeat(RepairSettings settings, const MotionExamination& contacts,
+  Attempt repeat(const RepairSettings& settings, const MotionExamination& contacts,
                  const Eigen::MatrixXd& start) const {
     Attempt best, last;
     ContactSchedule schedule;
@@ -268,11 +316,10 @@ class MotionRepairer::Workspace::Ladder {
       if (settings.feet) ground = findRepairGround(parts.parts, used.inference, recorded_.time);
       RepairedMotion repaired =
           repairMotion(parts, found_.before.derived.motion, schedule, settings, {}, ground,
-                       round == 0 ? start : last.repaired.motion.q);
+                       round == 0 ? start : last.repaired.motion.q, round == 0);
       MotionExamination found = workspace_.exact.examine(write(repaired.motion.q));
       const Index missing = countMissing(found);
       last = {std::move(repaired), std::move(found), missing};
-      settings.anew = false;
       if (round == 0 || isBetter(last, best)) best = last;
       if (last.missing == 0 && (!settings.feet || last.found.verdict.isFeasible())) break;
     }
@@ -325,11 +372,7 @@ class MotionRepairer::Workspace::Ladder {
       if (!finding.subject.empty()) text += " (" + finding.subject + ")";
       found_.reasons.push_back({to_string(fault), finding.time, text});
     }
-    const double excess = findExcess(found_.recorded.q);
-    if (settings_.repair.joints && excess > kWithinLimits)
-      found_.reasons.push_back(
-          {"joint_limits", internal::kNaN,
-           internal::concat("joints are beyond their limits, by up to ", excess, " rad")});
+    explainLimits();
     if (!isSmall(found_.change))
       found_.reasons.push_back(
           {"bound", recorded_.time[found_.root.frame],
@@ -338,6 +381,32 @@ class MotionRepairer::Workspace::Ladder {
                             found_.joints.largest, " rad: settings allow ",
                             settings_.largest_displacement, " m and ", settings_.largest_turn,
                             " rad")});
+  }
+
+  // Also where nobody asked for them, but they were kept before.
+  void explainLimits() {
+    const double excess = found_.joint_excess;
+    if (!(excess > kWithinLimits) ||
+        (!settings_.repair.joints && !(excess > found_.joint_excess_before + kGiven)))
+      return;
+    Index frame = 0;
+    std::string name;
+    double largest = 0.;
+    for (pinocchio::JointIndex index = 2; index < pinocchio::JointIndex(model().njoints); ++index)
+      for (const internal::LimitedJoint& joint : internal::listLimits(model(), 0., 0.)) {
+        if (joint.v != model().idx_vs[index]) continue;
+        for (Index k = 0; k < found_.recorded.q.cols(); ++k)
+          for (const internal::LimitKind kind : internal::kLimitKinds) {
+            const double own = measureExcess(joint, kind, recorded_.time, found_.recorded.q, k);
+            if (own <= largest) continue;
+            largest = own;
+            frame = k;
+            name = model().names[index];
+          }
+      }
+    found_.reasons.push_back(
+        {"joint_limits", recorded_.time[frame],
+         internal::concat(name, " is beyond its limits, by up to ", excess, " rad")});
   }
 
   // Frames whose wrench is still out of reach, where something carries, and where nothing does.
@@ -370,11 +439,14 @@ class MotionRepairer::Workspace::Ladder {
   const Workspace& workspace_;
   const RepairerSettings& settings_;
   const RecordedMotion& recorded_;
+  const bool is_left_;
   MotionRepair found_ = {};
 };
 
 MotionRepairer::MotionRepairer(const DynaCoM& robot, const RepairerSettings& settings) {
   settings.validate();
+  if (!internal::hasFreeFlyer(robot.getModel()))
+    internal::throwInvalid("the robot's root must be a free-flyer to be moved");
   workspace_ = std::make_unique<Workspace>(robot, settings);
 }
 
@@ -386,19 +458,16 @@ const RepairerSettings& MotionRepairer::getSettings() const { return workspace_-
 
 MotionRepair MotionRepairer::repair(const RecordedMotion& recorded) const {
   const Workspace& workspace = *workspace_;
-  MotionExamination before = workspace.recorded.examine(recorded);
-  MotionRepair found = Workspace::Ladder(workspace, recorded, before).climb();
-  if (before.verdict.outcome == MotionOutcome::Unknown) return found;
-  // Another rung before all others, if that leads farther.
+  MotionRepair found =
+      Workspace::Ladder(workspace, recorded, workspace.recorded.examine(recorded), true).climb();
+  if (found.before.verdict.outcome == MotionOutcome::Unknown) return found;
+  // Another rung before all others, if that leads to the end.
   const auto tryOther = [&](const RecordedMotion& other, RepairStep step) {
     MotionRepair climbed =
-        Workspace::Ladder(workspace, other, workspace.plain.examine(other)).climb();
-    if (climbed.outcome == RepairOutcome::NotRepaired) return;
-    climbed.outcome = RepairOutcome::Repaired;
+        Workspace::Ladder(workspace, other, workspace.plain.examine(other), false).climb();
+    if (climbed.outcome != RepairOutcome::Repaired) return;
     climbed.missing_before = found.missing_before;
     climbed.before = std::move(found.before);
-    climbed.recorded.v.resize(0, 0);
-    climbed.recorded.a.resize(0, 0);
     climbed.steps.insert(climbed.steps.begin(), step);
     found = std::move(climbed);
   };

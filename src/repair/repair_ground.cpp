@@ -88,7 +88,8 @@ void levelContacts(const std::vector<PartRobot::Part>& parts, const ContactInfer
       const std::size_t contact = parts[std::size_t(first)].contact;
       double lowest = internal::kNaN;
       for (; behind < ground.rows() && parts[std::size_t(behind)].contact == contact; ++behind)
-        if (inference.schedule.active(behind, frame) && !(ground(behind, frame) >= lowest))
+        if (inference.schedule.active(behind, frame) && !std::isnan(ground(behind, frame)) &&
+            !(ground(behind, frame) >= lowest))
           lowest = ground(behind, frame);
       for (Index part = first; part < behind; ++part)
         if (inference.schedule.active(part, frame))

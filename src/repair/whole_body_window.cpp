@@ -34,10 +34,15 @@ constexpr int kFailures = 2;
 constexpr Index kFarthest = 3;
 // The polish changes frames that are no farther from one in which something is missing [s].
 constexpr double kAround = 0.4;
+// A window stays as it was where more would be missing than that and this, RMS [m g], [m g·m].
+constexpr double kLost = 0.01;
 // Moments count as forces with this lever [m].
 constexpr double kLever = 1.;
 // A joint that is so far from the limit that it is held at costs 1 in a second [rad], [m].
 constexpr double kPinned = 1e-4;
+// By how much more it costs to change velocities at the ends of the motion than accelerations
+// elsewhere: what was before and comes after knows of no change.
+constexpr double kRest = 1e3;
 // By how much more an end that is pinned costs than other frames.
 constexpr double kAnchor = 1e10;
 
@@ -74,12 +79,15 @@ void WholeBodyWindow::forEachRow(const Constraint& constraint, Function act) con
 
 void WholeBodyWindow::solve(Index first, Index behind, Index asked, Eigen::MatrixXd& change,
                             Eigen::MatrixXd& q) {
+  const Eigen::MatrixXd start_change = change.middleCols(first, behind - first),
+                        start_q = q.middleCols(first, behind - first);
+  const double before = measureLack(q, first, std::min(behind, asked));
   begin(first, behind, asked);
   const bool is_far = !problem_.joints.empty() || problem_.floor.rows() > 0;
   for (int round = 0; round < (is_far ? kFarRounds : kRounds); ++round) {
     linearize(q);
     if (round == 0) restart();
-    if (!factorize(kPenalty, 1.)) return;
+    if (!factorize(kPenalty, 1.)) break;
     for (int k = 0; k < kIterations; ++k) {
       iterate(true, change);
       project(true);
@@ -87,6 +95,21 @@ void WholeBodyWindow::solve(Index first, Index behind, Index asked, Eigen::Matri
     apply(change, q);
   }
   mend(first, behind, asked, change, q);
+  // Where there is no solution nearby, steps may lead away from all.
+  const double allowed = before + kLost * kLost * double(behind - first);
+  if (measureLack(q, first, std::min(behind, asked)) <= allowed) return;
+  change.middleCols(first, behind - first) = start_change;
+  q.middleCols(first, behind - first) = start_q;
+}
+
+// The sum of the squares of what is missing.
+double WholeBodyWindow::measureLack(const Eigen::MatrixXd& q, Index first, Index behind) {
+  double lack = 0.;
+  for (Index frame = first; frame < behind; ++frame) {
+    const double missing = findMissingWrench(q, frame);
+    lack += missing * missing;
+  }
+  return std::isnan(lack) ? std::numeric_limits<double>::infinity() : lack;
 }
 
 void WholeBodyWindow::mend(Index first, Index behind, Index asked, Eigen::MatrixXd& change,
@@ -100,7 +123,7 @@ void WholeBodyWindow::mend(Index first, Index behind, Index asked, Eigen::Matrix
     polish(change, q);
     begun = -1;
   };
-  for (Index frame = first; frame <= last; ++frame) {
+  for (Index frame = std::max<Index>(first - 1, 0); frame <= last; ++frame) {
     if (begun >= 0 && frame > ended) close();
     if (findMissing(q, frame) <= kReached) continue;
     const auto before = std::lower_bound(time.data(), time.data() + frame, time[frame] - kAround);
@@ -118,6 +141,10 @@ double WholeBodyWindow::findMissing(const Eigen::MatrixXd& q, Index frame) {
     for (const LimitKind kind : kLimitKinds)
       if (const double off = measureOwnExcess(joint, kind, problem_.time, q, frame); off > kReached)
         return off;
+  return findMissingWrench(q, frame);
+}
+
+double WholeBodyWindow::findMissingWrench(const Eigen::MatrixXd& q, Index frame) {
   if (problem_.free[frame]) return 0.;
   linearizer_.evaluate(problem_.time, q, frame, evaluated_);
   const std::uint32_t set = problem_.sets[static_cast<std::size_t>(frame)];
@@ -234,8 +261,10 @@ double WholeBodyWindow::pin(const Eigen::MatrixXd& q) {
   pins_.clear();
   double largest = 0.;
   for (const LimitedJoint& joint : problem_.joints)
-    for (Index frame = first_; frame < behind_; ++frame)
+    for (Index frame = std::max<Index>(first_ - 1, 0); frame < behind_; ++frame)
       for (const LimitKind kind : kLimitKinds) {
+        // A step leads here from the frame before.
+        if (!isOfStep(kind) && !isSought(frame)) continue;
         const double off = measureExcess(joint, kind, problem_.time, q, frame);
         if (!(off > 0.)) continue;
         pins_.push_back({frame, &joint, kind, off});
@@ -284,10 +313,16 @@ double WholeBodyWindow::weighChange(Index frame) const {
   return differ(frame).duration * (problem_.pinned_ends && is_end ? kAnchor : 1.);
 }
 
+double WholeBodyWindow::weighAcceleration(Index frame) const {
+  const bool is_end = frame == 0 || frame == problem_.time.size() - 1;
+  return differ(frame).duration * (is_end ? kRest : 1.);
+}
+
 // By how much a step of the changes leads beyond a limit.
 double WholeBodyWindow::step(const Pin& pin) const {
   const Index row = pin.joint->v, column = pin.frame - first_;
-  double step = isOfStep(pin.kind) ? -step_(row, column) : step_(row, column);
+  double step = 0.;
+  if (isSought(pin.frame)) step = isOfStep(pin.kind) ? -step_(row, column) : step_(row, column);
   if (isOfStep(pin.kind) && isSought(pin.frame + 1)) step += step_(row, column + 1);
   return getSign(pin.kind) * step;
 }
@@ -296,10 +331,10 @@ void WholeBodyWindow::addPins() {
   for (const Pin& pin : pins_) {
     const Index row = pin.joint->v, here = pin.frame - first_, next = here + 1;
     const double weight = differ(pin.frame).duration * pinch_;
-    system_(here, here)(row, row) += weight;
-    if (!isOfStep(pin.kind) || !isSought(pin.frame + 1)) continue;
-    system_(next, next)(row, row) += weight;
-    system_(next, here)(row, row) -= weight;
+    const bool leads_on = isOfStep(pin.kind) && isSought(pin.frame + 1);
+    if (isSought(pin.frame)) system_(here, here)(row, row) += weight;
+    if (leads_on) system_(next, next)(row, row) += weight;
+    if (isSought(pin.frame) && leads_on) system_(next, here)(row, row) -= weight;
   }
 }
 
@@ -327,7 +362,7 @@ bool WholeBodyWindow::factorize(double penalty, double penalty_of_places) {
       for (int j = 0; j <= i; ++j)
         if (isSought(frame - 1 + i) && isSought(frame - 1 + j))
           block(frame - 1 + i, frame - 1 + j).diagonal() +=
-              difference.duration * factors[i] * factors[j] * problem_.of_acceleration;
+              weighAcceleration(frame) * factors[i] * factors[j] * problem_.of_acceleration;
   }
   for (const Constraint& constraint : constraints_) {
     const Index frame = constraint.frame;
@@ -358,7 +393,7 @@ void WholeBodyWindow::addCosts(const Eigen::MatrixXd& change) {
     Eigen::VectorXd acceleration = Eigen::VectorXd::Zero(change.rows());
     for (int i = 0; i < 3; ++i)
       if (factors[i] != 0.) acceleration += factors[i] * change.col(frame - 1 + i);
-    acceleration = difference.duration * problem_.of_acceleration.cwiseProduct(acceleration);
+    acceleration = weighAcceleration(frame) * problem_.of_acceleration.cwiseProduct(acceleration);
     for (int i = 0; i < 3; ++i)
       if (isSought(frame - 1 + i)) step_.col(frame - 1 + i - first_) -= factors[i] * acceleration;
     if (isSought(frame))
@@ -389,7 +424,7 @@ void WholeBodyWindow::iterate(bool with_costs, Eigen::MatrixXd& change) {
   for (const Pin& pin : pins_) {
     const Index row = pin.joint->v, column = pin.frame - first_;
     const double pull = getSign(pin.kind) * differ(pin.frame).duration * pinch_ * pin.off;
-    step_(row, column) += isOfStep(pin.kind) ? pull : -pull;
+    if (isSought(pin.frame)) step_(row, column) += isOfStep(pin.kind) ? pull : -pull;
     if (isOfStep(pin.kind) && isSought(pin.frame + 1)) step_(row, column + 1) -= pull;
   }
   system_.solve(step_);

@@ -84,6 +84,8 @@ class WholeBodyWindow {
   double pin(const Eigen::MatrixXd& q);
   double step(const Pin& pin) const;
   double findMissing(const Eigen::MatrixXd& q, Eigen::Index frame);
+  double findMissingWrench(const Eigen::MatrixXd& q, Eigen::Index frame);
+  double measureLack(const Eigen::MatrixXd& q, Eigen::Index first, Eigen::Index behind);
   void polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q);
   void stay();
   bool factorize(double penalty, double penalty_of_places);
@@ -95,6 +97,7 @@ class WholeBodyWindow {
   void apply(const Eigen::MatrixXd& change, Eigen::MatrixXd& q) const;
   double weigh(const Constraint& constraint) const;
   double weighChange(Eigen::Index frame) const;
+  double weighAcceleration(Eigen::Index frame) const;
   template <class Function>
   void forEachRow(const Constraint& constraint, Function act) const;
 
