@@ -14,7 +14,6 @@ from dynacom.dynacom_pywrap import (
 )
 from dynacom.robots import Robot
 
-
 # What may help against what is left.
 _HINTS = {
     "foot_sliding": "feet that slide in earnest need another motion; repair.largest_drift and "

@@ -32,16 +32,17 @@ constexpr double kProgress = 0.7;
 constexpr int kFailures = 2;
 // No wrench depends on frames that are farther away.
 constexpr Index kFarthest = 3;
-// The polish changes frames that are no farther from one in which something is missing [s].
-constexpr double kAround = 0.4;
+// The polish changes frames that are no farther from one in which something is missing, in windows.
+constexpr double kAround = 0.04;
 // A window stays as it was where more would be missing than that and this, RMS [m g], [m g·m].
 constexpr double kLost = 0.01;
 // Moments count as forces with this lever [m].
 constexpr double kLever = 1.;
 // A joint that is so far from the limit that it is held at costs 1 in a second [rad], [m].
 constexpr double kPinned = 1e-4;
-// By how much more it costs to change velocities at the ends of the motion than accelerations
-// elsewhere: what was before and comes after knows of no change.
+// By how much more it costs to change the root's velocity at the ends of the motion than
+// accelerations elsewhere: what was before and comes after knows of no change. Joints may have to,
+// where feet that slid stand still.
 constexpr double kRest = 1e3;
 // By how much more an end that is pinned costs than other frames.
 constexpr double kAnchor = 1e10;
@@ -116,6 +117,7 @@ void WholeBodyWindow::mend(Index first, Index behind, Index asked, Eigen::Matrix
                            Eigen::MatrixXd& q) {
   const Eigen::VectorXd& time = problem_.time;
   const Index last = std::min(asked, behind) - 1;
+  const double around = kAround * settings_.window;
   Index begun = -1, ended = -1;  // of a span of frames, with what is around them
   const auto close = [&] {
     if (begun < 0) return;
@@ -126,9 +128,9 @@ void WholeBodyWindow::mend(Index first, Index behind, Index asked, Eigen::Matrix
   for (Index frame = std::max<Index>(first - 1, 0); frame <= last; ++frame) {
     if (begun >= 0 && frame > ended) close();
     if (findMissing(q, frame) <= kReached) continue;
-    const auto before = std::lower_bound(time.data(), time.data() + frame, time[frame] - kAround);
+    const auto before = std::lower_bound(time.data(), time.data() + frame, time[frame] - around);
     const auto after =
-        std::upper_bound(time.data() + frame, time.data() + last + 1, time[frame] + kAround);
+        std::upper_bound(time.data() + frame, time.data() + last + 1, time[frame] + around);
     if (begun < 0) begun = std::max(first, Index(before - time.data()));
     ended = Index(after - time.data()) - 1;
     if (last - ended < kFarthest) ended = behind - 1;
@@ -313,9 +315,11 @@ double WholeBodyWindow::weighChange(Index frame) const {
   return differ(frame).duration * (problem_.pinned_ends && is_end ? kAnchor : 1.);
 }
 
-double WholeBodyWindow::weighAcceleration(Index frame) const {
-  const bool is_end = frame == 0 || frame == problem_.time.size() - 1;
-  return differ(frame).duration * (is_end ? kRest : 1.);
+// Of squares of accelerations in a frame.
+Eigen::VectorXd WholeBodyWindow::weighAcceleration(Index frame) const {
+  Eigen::VectorXd costs = differ(frame).duration * problem_.of_acceleration;
+  if (frame == 0 || frame == problem_.time.size() - 1) costs.head<6>() *= kRest;
+  return costs;
 }
 
 // By how much a step of the changes leads beyond a limit.
@@ -357,12 +361,12 @@ bool WholeBodyWindow::factorize(double penalty, double penalty_of_places) {
   for (Index frame = std::max<Index>(first_ - 1, 0); frame <= std::min(behind_, last); ++frame) {
     const Difference difference = differ(frame);
     const double factors[3] = {difference.before, difference.here, difference.after};
+    const Eigen::VectorXd costs = weighAcceleration(frame);
     if (isSought(frame)) block(frame, frame).diagonal() += weighChange(frame) * problem_.of_change;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j <= i; ++j)
         if (isSought(frame - 1 + i) && isSought(frame - 1 + j))
-          block(frame - 1 + i, frame - 1 + j).diagonal() +=
-              weighAcceleration(frame) * factors[i] * factors[j] * problem_.of_acceleration;
+          block(frame - 1 + i, frame - 1 + j).diagonal() += factors[i] * factors[j] * costs;
   }
   for (const Constraint& constraint : constraints_) {
     const Index frame = constraint.frame;
@@ -393,7 +397,7 @@ void WholeBodyWindow::addCosts(const Eigen::MatrixXd& change) {
     Eigen::VectorXd acceleration = Eigen::VectorXd::Zero(change.rows());
     for (int i = 0; i < 3; ++i)
       if (factors[i] != 0.) acceleration += factors[i] * change.col(frame - 1 + i);
-    acceleration = weighAcceleration(frame) * problem_.of_acceleration.cwiseProduct(acceleration);
+    acceleration = weighAcceleration(frame).cwiseProduct(acceleration);
     for (int i = 0; i < 3; ++i)
       if (isSought(frame - 1 + i)) step_.col(frame - 1 + i - first_) -= factors[i] * acceleration;
     if (isSought(frame))

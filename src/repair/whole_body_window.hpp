@@ -97,7 +97,7 @@ class WholeBodyWindow {
   void apply(const Eigen::MatrixXd& change, Eigen::MatrixXd& q) const;
   double weigh(const Constraint& constraint) const;
   double weighChange(Eigen::Index frame) const;
-  double weighAcceleration(Eigen::Index frame) const;
+  Eigen::VectorXd weighAcceleration(Eigen::Index frame) const;
   template <class Function>
   void forEachRow(const Constraint& constraint, Function act) const;
 

@@ -320,6 +320,7 @@ def test_time_and_gravity(models, motion, exponent):
     for scaled in (whole, centroidal):
         scaled.window *= s
         scaled.overlap *= s
+    whole.slide_speed /= s
     assert_same(slow.repair(whole).change, repaired(case).change)
     one, other = measured(case), measured(slow, centroidal)
     assert_same(other.com, one.com)
@@ -329,13 +330,16 @@ def test_time_and_gravity(models, motion, exponent):
 @CALM
 @given(motions(*ON_GROUND))
 def test_what_is_repaired_comes_back_bit_for_bit(models, motion):
-    """So does its centre of mass."""
+    """So does its centre of mass. Feet are left out: those that slide slowly after the first repair
+    may be held still in the second."""
     case = make_case(models, motion)
-    found = repaired(case)
+    settings = RepairSettings()
+    settings.feet = settings.joints = False
+    found = repaired(case, settings)
     assert found.within_reach
     again = replace(case, q=found.motion.q)
-    assert_array_equal(again.repair().motion.q, again.q)
-    assert not again.repair().change.any()
+    assert_array_equal(again.repair(settings).motion.q, again.q)
+    assert not again.repair(settings).change.any()
     assert not again.measure().com.any()
 
 
@@ -356,7 +360,7 @@ def test_what_is_repaired_hardly_moves(models, motion):
     still in the second repair, and were not in the first."""
     case = make_case(models, motion)
     settings = RepairSettings()
-    settings.largest_drift = 0.0
+    settings.feet = settings.joints = False
     again = replace(case, q=repaired(case, settings).motion.q).repair(settings)
     assert again.root_rms < 1e-4
     assert again.joint_rms < 1e-4
