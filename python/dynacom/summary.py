@@ -97,7 +97,7 @@ def repair_table(summary: dict[str, Any]) -> Table:
         when = "" if reason["time"] is None else f" (at {reason['time']:.2f} s)"
         table.add_row(f"  {reason['code']}", escape(f"{reason['text']}{when}"))
         if reason.get("hint"):
-            table.add_row("", escape(f"What may help: {reason['hint']}"))
+            table.add_row("    what may help", escape(reason["hint"]))
     table.add_section()
     verdicts = [_verdict_text(repair, ending) for ending in ("_before", "")]
     table.add_row("Verdict", " → ".join(verdicts))

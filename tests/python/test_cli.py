@@ -926,7 +926,7 @@ def test_check_of_repairs(command, refuses, hurried, talos, talos_standing, tmp_
     """A motion that is feasible, or was made so, passes; one that is repairable if that will do."""
     trot = tmp_path / "trot.npz"
     with np.load(WALKS / "anymal_trot.npz") as file:
-        np.savez(trot, t=file["t"] / 2.0, q=file["q"])
+        np.savez(trot, t=file["t"] / 3.0, q=file["q"])
     floating = tmp_path / "floating.npz"
     q = np.tile(talos_standing, (100, 1))
     time = np.arange(100) / 50.0
@@ -965,11 +965,11 @@ def test_notes_of_what_was_written_are_printed(command, tmp_path):
         q = file["q"]
     joints = [q[:, robot.model.joints[robot.model.getJointId(n)].idx_q] for n in urdf_order(robot)]
     write_csv(path, np.column_stack([q[:, :7], *joints]))
-    arguments = ("--robot", "anymal_c", "--fps", 100, "--no-page", "--out", tmp_path / "out")
+    arguments = ("--robot", "anymal_c", "--fps", 150, "--no-page", "--out", tmp_path / "out")
     status, printed, _ = command("repair", path, *arguments, "--stretch", 1.5)
     assert status == 0
     stretch = summary(tmp_path / "out")["repair"]["stretch"]
-    note = f"its frame rate is {100 / stretch:.9g} Hz now (--fps)."
+    note = f"its frame rate is {150 / stretch:.9g} Hz now (--fps)."
     assert note in summary(tmp_path / "out")["notes"][-1]
     assert " ".join(printed.replace("│", " ").split()).count(note) == 1
     again = ("analyze", tmp_path / "out/trot.csv", "--robot", "anymal_c", "--no-page", "--check")
