@@ -69,6 +69,30 @@ BOOST_AUTO_TEST_CASE(who_sways_too_fast_is_repaired) {
   BOOST_TEST((again.recorded.q == repair.recorded.q));
 }
 
+BOOST_AUTO_TEST_CASE(turns_and_limits_are_told) {
+  Swayer walker;
+  walker.model.upperPositionLimit[13] = 1.6;
+  walker.model.lowerPositionLimit[13] = 0.;
+  DynaCoM robot(walker.model);
+  for (const char* name : {"left", "right"})
+    robot.addContact(makeSole(std::string(name) + "_foot"), name);
+  const RecordedMotion recorded = record(walker.sway(300, 0.09));
+  RepairerSettings settings;
+  const MotionRepair limited = repairRecordedMotion(robot, recorded, settings);
+  BOOST_TEST(limited.turn.largest > 1e-4);
+  BOOST_TEST(std::abs(limited.joint_excess_before - 0.2) < 0.02);
+  // Who is beyond is never called repaired.
+  const bool is_beyond = limited.joint_excess > 1e-9;
+  BOOST_TEST(hasReason(limited, "joint_limits") == is_beyond);
+  BOOST_TEST((limited.outcome == RepairOutcome::Repaired) == !is_beyond);
+  // Nobody asked for limits, and yet it is told that they are exceeded more than before.
+  settings.repair.joints = settings.repair.feet = false;
+  const MotionRepair other = repairRecordedMotion(robot, recorded, settings);
+  BOOST_TEST(other.joint_excess > 0.1);
+  BOOST_TEST((hasReason(other, "joint_limits") ==
+              (other.joint_excess > other.joint_excess_before + 1e-3)));
+}
+
 BOOST_AUTO_TEST_CASE(strictly_single_frames_are_mended_too) {
   const Swayer walker;
   // A few frames out of reach, which a verdict allows.

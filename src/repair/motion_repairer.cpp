@@ -352,6 +352,9 @@ class MotionRepairer::Workspace::Ladder {
     found_.change = std::move(attempt.repaired.change);
     found_.root = summarize(found_.change.topRows<3>().colwise().norm());
     found_.joints = summarizeJoints(model(), found_.change);
+    found_.turn = summarize(found_.change.middleRows<3>(3).colwise().norm());
+    found_.joint_excess_before = findExcess(found_.before.derived.motion.q);
+    found_.joint_excess = findExcess(found_.recorded.q);
     found_.com =
         summarize((found_.after.analysis.com - found_.before.analysis.com).colwise().norm());
     RecordedMotion unmarked = found_.recorded;
