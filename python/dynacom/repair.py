@@ -64,7 +64,8 @@ class RepairReport:
 
     @property
     def changed(self) -> bool:
-        """Whether the motion is another one now: not where it was feasible, or nobody knows."""
+        """Whether the motion is another one now: not where it was feasible, nobody knows, or all that
+        was tried is worse."""
         return self.after is not self.before
 
     @property
@@ -283,12 +284,13 @@ def repair_clip(
     except ValueError as error:
         raise DynacomError(f"{clip.path}: {error}") from error
     before = after = MotionReport(clip, robot, options, found.before, schedule_text)
-    if found.outcome != "feasible" and found.before.verdict.outcome != "unknown":
+    made = found.recorded
+    if not (np.array_equal(made.q, recorded.q) and np.array_equal(made.time, recorded.time)):
         # Forces in the file were those of the motion before.
         repaired = replace(
             clip,
-            time=np.array(found.recorded.time),
-            q=np.array(found.recorded.q),
+            time=np.array(made.time),
+            q=np.array(made.q),
             v=None,
             a=None,
             forces={},

@@ -63,4 +63,15 @@ double measureOwnExcess(const LimitedJoint& joint, LimitKind kind, const Eigen::
   return excess - joint.speed_margin * (time[frame + 1] - time[frame]);
 }
 
+LargestExcess findLargestExcess(const pinocchio::Model& model, const Eigen::VectorXd& time,
+                                const Eigen::MatrixXd& q) {
+  LargestExcess largest;
+  for (const LimitedJoint& joint : listLimits(model, 0., 0.))
+    for (Eigen::Index frame = 0; frame < q.cols(); ++frame)
+      for (const LimitKind kind : kLimitKinds)
+        if (const double size = measureExcess(joint, kind, time, q, frame); size > largest.size)
+          largest = {size, frame, joint.v};
+  return largest;
+}
+
 }  // namespace dynacom::internal

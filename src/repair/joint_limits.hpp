@@ -41,4 +41,12 @@ double measureExcess(const LimitedJoint& joint, LimitKind kind, const Eigen::Vec
 double measureOwnExcess(const LimitedJoint& joint, LimitKind kind, const Eigen::VectorXd& time,
                         const Eigen::MatrixXd& q, Eigen::Index frame);
 
+/// The joint that is farthest beyond a limit in a motion.
+struct LargestExcess {
+  double size = 0.;  // zero where none is
+  Eigen::Index frame = 0, v = -1;
+};
+LargestExcess findLargestExcess(const pinocchio::Model& model, const Eigen::VectorXd& time,
+                                const Eigen::MatrixXd& q);
+
 }  // namespace dynacom::internal

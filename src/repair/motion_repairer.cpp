@@ -286,12 +286,7 @@ class MotionRepairer::Workspace::Ladder {
   }
 
   double findExcess(const Eigen::MatrixXd& q) const {
-    double largest = 0.;
-    for (const internal::LimitedJoint& joint : internal::listLimits(model(), 0., 0.))
-      for (Index frame = 0; frame < q.cols(); ++frame)
-        for (const internal::LimitKind kind : internal::kLimitKinds)
-          largest = std::max(largest, measureExcess(joint, kind, recorded_.time, q, frame));
-    return largest;
+    return internal::findLargestExcess(model(), recorded_.time, q).size;
   }
 
   bool isSmall(const Eigen::MatrixXd& change) const {
@@ -392,24 +387,14 @@ class MotionRepairer::Workspace::Ladder {
     if (!(excess > kWithinLimits) ||
         (!settings_.repair.joints && !(excess > found_.joint_excess_before + kGiven)))
       return;
-    Index frame = 0;
-    std::string name;
-    double largest = 0.;
-    for (pinocchio::JointIndex index = 2; index < pinocchio::JointIndex(model().njoints); ++index)
-      for (const internal::LimitedJoint& joint : internal::listLimits(model(), 0., 0.)) {
-        if (joint.v != model().idx_vs[index]) continue;
-        for (Index k = 0; k < found_.recorded.q.cols(); ++k)
-          for (const internal::LimitKind kind : internal::kLimitKinds) {
-            const double own = measureExcess(joint, kind, recorded_.time, found_.recorded.q, k);
-            if (own <= largest) continue;
-            largest = own;
-            frame = k;
-            name = model().names[index];
-          }
-      }
+    const internal::LargestExcess largest =
+        internal::findLargestExcess(model(), recorded_.time, found_.recorded.q);
+    const auto& joints = model().idx_vs;
+    const auto joint = std::find(joints.begin() + 1, joints.end(), int(largest.v)) - joints.begin();
     found_.reasons.push_back(
-        {"joint_limits", recorded_.time[frame],
-         internal::concat(name, " is beyond its limits, by up to ", excess, " rad")});
+        {"joint_limits", recorded_.time[largest.frame],
+         internal::concat(model().names[std::size_t(joint)], " is beyond its limits, by up to ",
+                          excess, " rad")});
   }
 
   // Frames whose wrench is still out of reach, where something carries, and where nothing does.
