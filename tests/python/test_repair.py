@@ -318,6 +318,25 @@ def test_a_motion_that_is_too_short(talos, talos_standing, tmp_path):
     assert (tmp_path / "out/short.npz").read_bytes() == path.read_bytes()
 
 
+def test_what_nothing_helps_stays_as_it_was(talos, tmp_path):
+    """Bit for bit, and without a mark: it may be as noisy as it was."""
+    noise = np.random.default_rng(5)
+    with np.load(WALKS / "talos_walk.npz") as file:
+        q = np.tile(file["q"][0], (100, 1))
+    time = np.arange(100) / 50.0
+    q[:, 2] += np.clip(4.0 * time * (2.0 - time), 0.0, 1.0)
+    q[:, 7:] += noise.normal(0.0, 0.002, (100, q.shape[1] - 7))
+    path = tmp_path / "hover.npz"
+    np.savez(path, t=time, q=q)
+    report = dynacom.repair(path, talos)
+    assert report.outcome == "not repaired"
+    assert "not_better" in {reason.code for reason in report.repair.reasons}
+    assert not report.changed
+    report.save(tmp_path / "out", page=False)
+    assert (tmp_path / "out/hover.npz").read_bytes() == path.read_bytes()
+    assert not dynacom.read_motion(tmp_path / "out/hover.npz", talos).exact
+
+
 # Time.
 
 
