@@ -64,8 +64,7 @@ class RepairReport:
 
     @property
     def changed(self) -> bool:
-        """Whether the motion is another one now: not where it was feasible, nobody knows, or all that
-        was tried is worse."""
+        """Whether the motion is another one now: not where it was feasible, or nothing helped."""
         return self.after is not self.before
 
     @property
