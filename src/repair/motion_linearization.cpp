@@ -33,8 +33,18 @@ MotionLinearizer::MotionLinearizer(const pinocchio::Model& model, std::vector<Bo
   for (const pinocchio::Inertia& inertia : model.inertias) mass_ += inertia.mass();
   weight_ = mass_ * findUnitGravity(model.gravity.linear());
   for (Eigen::VectorXd* vector : {&v_, &a_, &step_}) vector->setZero(model.nv);
-  for (auto* matrix : {&of_momentum_, &by_q_, &by_v_, &by_a_, &by_step_, &jacobian_})
+  for (auto* matrix : {&of_momentum_, &by_q_, &by_v_, &by_a_, &by_step_})
     matrix->setZero(6, model.nv);
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    const pinocchio::JointIndex joint = points_[k].joint;
+    const auto body = std::find_if(bodies_.begin(), bodies_.end(),
+                                   [&](const PointedBody& other) { return other.joint == joint; });
+    const std::uint32_t own = std::uint32_t(1) << k;
+    if (body == bodies_.end())
+      bodies_.push_back({joint, own});
+    else
+      body->points |= own;
+  }
   for (Eigen::MatrixXd* matrix : {&by_here_, &by_other_}) matrix->setZero(model.nv, model.nv);
 }
 
@@ -82,8 +92,11 @@ void MotionLinearizer::locate(LinearizedFrame& linear) const {
   linear.wrench << data_.dhg.linear() - mass_ * model_.gravity.linear(), data_.dhg.angular();
   linear.wrench /= weight_;
   linear.points.resize(3, Index(points_.size()));
+  linear.arms.resize(3, Index(points_.size()));
   for (std::size_t k = 0; k < points_.size(); ++k) {
-    linear.points.col(Index(k)) = data_.oMi[points_[k].joint].act(points_[k].place);
+    const pinocchio::SE3& body = data_.oMi[points_[k].joint];
+    linear.arms.col(Index(k)) = body.rotation() * points_[k].place;
+    linear.points.col(Index(k)) = body.translation() + linear.arms.col(Index(k));
     linear.points(2, Index(k)) -= points_[k].drop;
   }
 }
@@ -102,7 +115,7 @@ void MotionLinearizer::linearize(const Eigen::VectorXd& time, const Eigen::Matri
                                                   by_q_, by_v_, by_a_);
   locate(linear);
   linear.of_com = by_a_.topRows<3>() / mass_;
-  linear.of_points.resize(points_.size());
+  linear.of_bodies.resize(bodies_.size());
   linear.terms.assign(1, {frame, by_q_ / weight_});
   for (const Difference& difference : differences_) {
     by_step_ = (difference.velocity * by_v_ + difference.acceleration * by_a_) / weight_;
@@ -110,8 +123,17 @@ void MotionLinearizer::linearize(const Eigen::VectorXd& time, const Eigen::Matri
                            pinocchio::ARG0);
     pinocchio::dDifference(model_, q.col(frame), q.col(difference.other), by_other_,
                            pinocchio::ARG1);
-    linear.terms[0].derivative.noalias() += by_step_ * by_here_;
-    linear.terms.push_back({difference.other, by_step_ * by_other_});
+    LinearizedFrame::Term& other = linear.terms.emplace_back();
+    other.frame = difference.other;
+    other.derivative.resize(6, model_.nv);
+    // A joint's part of a step depends on the joint alone.
+    for (std::size_t joint = 1; joint < std::size_t(model_.njoints); ++joint) {
+      const Index v = model_.idx_vs[joint], nv = model_.nvs[joint];
+      const auto by_own = by_step_.middleCols(v, nv);
+      linear.terms[0].derivative.middleCols(v, nv) +=
+          by_own.lazyProduct(by_here_.block(v, v, nv, nv));
+      other.derivative.middleCols(v, nv) = by_own.lazyProduct(by_other_.block(v, v, nv, nv));
+    }
   }
   std::sort(linear.terms.begin(), linear.terms.end(),
             [](const auto& one, const auto& other) { return one.frame < other.frame; });
@@ -119,17 +141,22 @@ void MotionLinearizer::linearize(const Eigen::VectorXd& time, const Eigen::Matri
 }
 
 void MotionLinearizer::linearizePoints(std::uint32_t asked, LinearizedFrame& linear) {
-  pinocchio::JointIndex joint = 0;  // of the Jacobian
-  for (std::size_t k = 0; k < points_.size(); ++k) {
-    if (!(asked >> k & 1u)) continue;
-    if (joint != points_[k].joint) {
-      joint = points_[k].joint;
-      jacobian_.setZero();
-      pinocchio::getJointJacobian(model_, data_, joint, pinocchio::LOCAL_WORLD_ALIGNED, jacobian_);
-    }
-    const Eigen::Vector3d arm = data_.oMi[joint].rotation() * points_[k].place;
-    linear.of_points[k] = jacobian_.topRows<3>() - pinocchio::skew(arm) * jacobian_.bottomRows<3>();
+  for (std::size_t k = 0; k < bodies_.size(); ++k) {
+    if ((bodies_[k].points & asked) == 0) continue;
+    linear.of_bodies[k].setZero(6, model_.nv);
+    pinocchio::getJointJacobian(model_, data_, bodies_[k].joint, pinocchio::LOCAL_WORLD_ALIGNED,
+                                linear.of_bodies[k]);
   }
+}
+
+Eigen::Matrix3Xd MotionLinearizer::findPointJacobian(const LinearizedFrame& linear,
+                                                     Index point) const {
+  const auto own = std::find_if(bodies_.begin(), bodies_.end(), [&](const PointedBody& body) {
+    return (body.points >> point & 1u) != 0;
+  });
+  const auto& jacobian = linear.of_bodies[std::size_t(own - bodies_.begin())];
+  return jacobian.topRows<3>() -
+         pinocchio::skew(Eigen::Vector3d(linear.arms.col(point))) * jacobian.bottomRows<3>();
 }
 
 }  // namespace dynacom::internal

@@ -15,6 +15,12 @@ struct BodyPoint {
   double drop = 0.;       // how far below that it touches, whatever the joint's orientation
 };
 
+/// A body that has points.
+struct PointedBody {
+  pinocchio::JointIndex joint;
+  std::uint32_t points;  // a bit for each
+};
+
 /// What a frame of a motion needs, and how that changes with the configurations, in their tangent
 /// spaces. Wrenches are about the CoM, over the weight m g.
 struct LinearizedFrame {
@@ -27,9 +33,11 @@ struct LinearizedFrame {
   Eigen::Matrix<double, 6, 1> wrench;
   std::vector<Term> terms;  // of the frame and those that its differences reach, in order
   Eigen::Vector3d com;
-  Eigen::Matrix3Xd of_com;                  // its derivative, 3 × nv
-  Eigen::Matrix3Xd points;                  // places in the world
-  std::vector<Eigen::Matrix3Xd> of_points;  // their derivatives, 3 × nv, of those asked for
+  Eigen::Matrix3Xd of_com;  // its derivative, 3 × nv
+  Eigen::Matrix3Xd points;  // places in the world
+  Eigen::Matrix3Xd arms;    // of points, from where the Jacobians of their bodies are
+  // Of bodies that have points that were asked for: linear, then angular velocity in the world.
+  std::vector<Eigen::Matrix<double, 6, Eigen::Dynamic>> of_bodies;
 
   Term& own(Eigen::Index frame);
 };
@@ -44,6 +52,7 @@ class MotionLinearizer {
   MotionLinearizer(const pinocchio::Model& model, std::vector<BodyPoint> points);
 
   const std::vector<BodyPoint>& points() const { return points_; }
+  const std::vector<PointedBody>& bodies() const { return bodies_; }
 
   /// What a frame of a motion needs that has four at least, and where its points are: nothing of
   /// the derivatives.
@@ -52,12 +61,15 @@ class MotionLinearizer {
 
   /// Linearizes a frame of a motion that has four at least.
   /// @param q         configurations, nq × frames
-  /// @param asked     a bit for each point whose derivative is asked for
+  /// @param asked     a bit for each point of whose body the Jacobian is asked for
   void linearize(const Eigen::VectorXd& time, const Eigen::MatrixXd& q, Eigen::Index frame,
                  std::uint32_t asked, LinearizedFrame& linear);
 
-  /// Adds derivatives of points, of the frame that was linearized last.
+  /// Adds Jacobians of bodies of points, of the frame that was linearized last.
   void linearizePoints(std::uint32_t asked, LinearizedFrame& linear);
+
+  /// The derivative of a point whose body was asked for, 3 × nv.
+  Eigen::Matrix3Xd findPointJacobian(const LinearizedFrame& linear, Eigen::Index point) const;
 
   /// The frames whose configurations a frame's wrench depends on: the first and the last.
   static std::pair<Eigen::Index, Eigen::Index> findReach(Eigen::Index frame, Eigen::Index frames);
@@ -75,11 +87,12 @@ class MotionLinearizer {
 
   const pinocchio::Model& model_;
   const std::vector<BodyPoint> points_;
+  std::vector<PointedBody> bodies_;
   pinocchio::Data data_;
   double mass_ = 0., weight_ = 0.;
   std::vector<Difference> differences_;
   Eigen::VectorXd v_, a_, step_;
-  Eigen::Matrix<double, 6, Eigen::Dynamic> of_momentum_, by_q_, by_v_, by_a_, by_step_, jacobian_;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> of_momentum_, by_q_, by_v_, by_a_, by_step_;
   Eigen::MatrixXd by_here_, by_other_;
 };
 

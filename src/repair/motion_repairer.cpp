@@ -162,8 +162,7 @@ class MotionRepairer::Workspace::Ladder {
       const RepairChange moved = summarize((origin.q - recorded_.q).topRows<3>().colwise().norm());
       found_.steps.push_back({RepairRung::Filter, 0., moved.rms, true});
     }
-    const std::optional<MotionExamination> exact = findContacts();
-    const MotionExamination& contacts = exact ? *exact : found_.before;
+    const Contacts contacts = findContacts();
     std::optional<Attempt> best = balance(contacts);
     if (settings_.repair.feet || settings_.repair.joints) standAndLimit(contacts, best);
     if (!best) return giveUp();
@@ -172,10 +171,20 @@ class MotionRepairer::Workspace::Ladder {
   }
 
  private:
+  // Those that a motion is repaired with.
+  struct Contacts {
+    std::vector<BodyPoints> links;
+    ContactInference inference;
+  };
+
+  // What repairMotion() found, and how that is judged, as an exact motion.
   struct Attempt {
-    RepairedMotion repaired;
+    Eigen::MatrixXd change;
+    std::vector<RepairedStance> stances;
     MotionExamination found;
     Index missing = 0;
+
+    const Eigen::MatrixXd& q() const { return found.derived.motion.q; }
   };
 
   const pinocchio::Model& model() const { return workspace_.robot.getModel(); }
@@ -211,21 +220,23 @@ class MotionRepairer::Workspace::Ladder {
   }
 
   // Those of the same motion taken for exact, if they do not make it much harder.
-  std::optional<MotionExamination> findContacts() {
-    if (found_.before.derived.isExact()) return std::nullopt;
-    MotionExamination exact = workspace_.exact.examine(write(found_.before.derived.motion.q));
+  Contacts findContacts() {
+    const auto of = [](const MotionExamination& found) -> Contacts {
+      return {found.links, found.inference};
+    };
+    if (found_.before.derived.isExact()) return of(found_.before);
+    const MotionExamination exact = workspace_.exact.examine(write(found_.before.derived.motion.q));
     const auto distanceOf = [](const MotionExamination& found) {
       return found.distance && found.distance->converged ? found.distance->rms : internal::kNaN;
     };
     const double before = distanceOf(found_.before), after = distanceOf(exact);
     const bool is_kept = after <= kFarther * before + kFartherBy;
     found_.steps.push_back({RepairRung::Schedule, before, after, is_kept});
-    if (!is_kept) return std::nullopt;
-    return exact;
+    return of(is_kept ? exact : found_.before);
   }
 
   // Wrenches alone; nothing where that makes the motion worse.
-  std::optional<Attempt> balance(const MotionExamination& contacts) {
+  std::optional<Attempt> balance(const Contacts& contacts) {
     RepairSettings settings = settings_.repair;
     settings.feet = settings.joints = false;
     Attempt attempt = repeat(settings, contacts, found_.before.derived.motion.q);
@@ -238,26 +249,26 @@ class MotionRepairer::Workspace::Ladder {
 
   // Feet and joints, if something is wrong with them, and no wrench is lost for it. Where balance
   // alone has not led to where contacts are found again, feet that are level may.
-  void standAndLimit(const MotionExamination& contacts, std::optional<Attempt>& best) {
+  void standAndLimit(const Contacts& contacts, std::optional<Attempt>& best) {
     const Eigen::MatrixXd& origin = found_.before.derived.motion.q;
     const bool is_balanced = best && best->missing == 0;
     const bool are_limits_wrong =
-        settings_.repair.joints &&
-        findExcess(best ? best->repaired.motion.q : origin) > kWithinLimits;
+        settings_.repair.joints && findExcess(best ? best->q() : origin) > kWithinLimits;
     const bool are_feet_wrong =
         settings_.repair.feet && !(best && best->found.verdict.isFeasible());
     if (best && !are_limits_wrong && !are_feet_wrong) return;
-    Attempt attempt = repeat(settings_.repair, is_balanced ? best->found : contacts,
-                             is_balanced ? best->repaired.motion.q : origin);
-    const bool is_kept = isSmall(attempt.repaired.change) &&
-                         (best ? !isWorse(attempt, best->found, best->missing)
-                               : !isWorse(attempt, found_.before, found_.missing_before));
+    Attempt attempt = is_balanced ? repeat(settings_.repair,
+                                           {best->found.links, best->found.inference}, best->q())
+                                  : repeat(settings_.repair, contacts, origin);
+    const bool is_kept =
+        isSmall(attempt.change) && (best ? !isWorse(attempt, best->found, best->missing)
+                                         : !isWorse(attempt, found_.before, found_.missing_before));
     if (settings_.repair.feet)
       found_.steps.push_back(
           {RepairRung::Feet, findSlide(found_.before), findSlide(attempt.found), is_kept});
     if (settings_.repair.joints)
       found_.steps.push_back(
-          {RepairRung::Joints, findExcess(origin), findExcess(attempt.repaired.motion.q), is_kept});
+          {RepairRung::Joints, findExcess(origin), findExcess(attempt.q()), is_kept});
     if (is_kept) best = std::move(attempt);
   }
 
@@ -296,29 +307,44 @@ class MotionRepairer::Workspace::Ladder {
 
   // Repairs with the contacts that were found. Where these are others then, and cannot give what is
   // needed, it does so once more with those, near such frames, and so on.
-  Attempt repeat(const RepairSettings& settings, const MotionExamination& contacts,
+  Attempt repeat(const RepairSettings& settings, const Contacts& contacts,
                  const Eigen::MatrixXd& start) const {
-    Attempt best, last;
-    ContactSchedule schedule;
-    for (int round = 0; round < settings_.rounds; ++round) {
-      const MotionExamination& used = round == 0 ? contacts : last.found;
-      if (round == 0 || schedule.names != used.inference.schedule.names)
-        schedule = used.inference.schedule;
-      else
-        adopt(used, schedule);
-      const PartRobot parts = splitContacts(workspace_.robot, used.links);
-      RepairGround ground;
-      if (settings.feet) ground = findRepairGround(parts.parts, used.inference, recorded_.time);
-      RepairedMotion repaired =
-          repairMotion(parts, found_.before.derived.motion, schedule, settings, {}, ground,
-                       round == 0 ? start : last.repaired.motion.q, round == 0);
-      MotionExamination found = workspace_.exact.examine(write(repaired.motion.q));
-      const Index missing = countMissing(found);
-      last = {std::move(repaired), std::move(found), missing};
-      if (round == 0 || isBetter(last, best)) best = last;
+    ContactSchedule schedule = contacts.inference.schedule;
+    Attempt best = tryWith(settings, contacts.links, contacts.inference, schedule, start, true);
+    std::optional<Attempt> worse;  // the last, if it is
+    for (int round = 1; round < settings_.rounds; ++round) {
+      const Attempt& last = worse ? *worse : best;
       if (last.missing == 0 && (!settings.feet || last.found.verdict.isFeasible())) break;
+      const ContactInference& inference = last.found.inference;
+      if (schedule.names == inference.schedule.names)
+        adopt(last.found, schedule);
+      else
+        schedule = inference.schedule;
+      Attempt next = tryWith(settings, last.found.links, inference, schedule, last.q(), false);
+      if (isBetter(next, best)) {
+        best = std::move(next);
+        worse.reset();
+      } else {
+        worse = std::move(next);
+      }
     }
     return best;
+  }
+
+  // @param schedule  of contacts that may be other than those of `inference`
+  // @param is_new    whether costs count, or frames are mended only that are out of reach
+  Attempt tryWith(const RepairSettings& settings, const std::vector<BodyPoints>& links,
+                  const ContactInference& inference, const ContactSchedule& schedule,
+                  const Eigen::MatrixXd& start, bool is_new) const {
+    const PartRobot parts = splitContacts(workspace_.robot, links);
+    RepairGround ground;
+    if (settings.feet) ground = findRepairGround(parts.parts, inference, recorded_.time);
+    RepairedMotion repaired = repairMotion(parts, found_.before.derived.motion, schedule, settings,
+                                           {}, ground, start, is_new);
+    Attempt attempt = {std::move(repaired.change), std::move(repaired.stances),
+                       workspace_.exact.examine(write(repaired.motion.q)), 0};
+    attempt.missing = countMissing(attempt.found);
+    return attempt;
   }
 
   // Takes contacts that were found around frames in which they cannot give what is needed.
@@ -340,11 +366,11 @@ class MotionRepairer::Workspace::Ladder {
   }
 
   void finish(Attempt attempt) {
-    found_.recorded = write(attempt.repaired.motion.q);
+    found_.recorded = write(attempt.q());
     found_.after = std::move(attempt.found);
     found_.missing = attempt.missing;
-    found_.stances = std::move(attempt.repaired.stances);
-    found_.change = std::move(attempt.repaired.change);
+    found_.stances = std::move(attempt.stances);
+    found_.change = std::move(attempt.change);
     found_.root = summarize(found_.change.topRows<3>().colwise().norm());
     found_.joints = summarizeJoints(model(), found_.change);
     found_.turn = summarize(found_.change.middleRows<3>(3).colwise().norm());

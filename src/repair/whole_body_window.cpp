@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "whole_body_window.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <pinocchio/algorithm/joint-configuration.hpp>
+#include <pinocchio/spatial.hpp>
 
 namespace dynacom::internal {
 
@@ -19,7 +21,7 @@ namespace {
 constexpr double kPenalty = 2000., kFlight = 300., kRelaxation = 1.6;
 constexpr int kRounds = 2, kIterations = 12;
 // How often it does where feet or joints have to be moved, which is farther.
-constexpr int kFarRounds = 5;
+constexpr int kFarRounds = 5, kFarIterations = 5;
 // Then, costs count no more: the nearest motion within the cones, in which points and joints that
 // are held stay as they are, with larger penalties.
 constexpr double kPolish = 100., kPolishPlaces = 100.;
@@ -69,15 +71,6 @@ WholeBodyWindow::WholeBodyWindow(const WholeBodyProblem& problem, const RepairSe
   for (const double mu : problem.mu) mu_.push_back(mu * (1. - settings.friction_margin));
 }
 
-// Of a point that is held, all three coordinates count, of a lifted one its height.
-template <class Function>
-void WholeBodyWindow::forEachRow(const Constraint& constraint, Function act) const {
-  if (!isSought(constraint.frame)) return;
-  forEachPoint(problem_.held[static_cast<std::size_t>(constraint.frame)],
-               [&](Index point) { act(point, Index(0), Index(3)); });
-  forEachPoint(constraint.lifted, [&](Index point) { act(point, Index(2), Index(1)); });
-}
-
 void WholeBodyWindow::solve(Index first, Index behind, Index asked, Eigen::MatrixXd& change,
                             Eigen::MatrixXd& q) {
   const Eigen::MatrixXd start_change = change.middleCols(first, behind - first),
@@ -89,7 +82,7 @@ void WholeBodyWindow::solve(Index first, Index behind, Index asked, Eigen::Matri
     linearize(q);
     if (round == 0) restart();
     if (!factorize(kPenalty, 1.)) break;
-    for (int k = 0; k < kIterations; ++k) {
+    for (int k = 0; k < (is_far ? kFarIterations : kIterations); ++k) {
       iterate(true, change);
       project(true);
     }
@@ -233,28 +226,76 @@ double WholeBodyWindow::linearize(const Eigen::MatrixXd& q) {
 
 // Says how far points are from where they are to be.
 void WholeBodyWindow::place(Constraint& constraint) {
-  const Index frame = constraint.frame;
-  constraint.off.setZero(3, constraint.linear.points.cols());
-  forEachPoint(problem_.held[static_cast<std::size_t>(frame)], [&](Index point) {
-    constraint.off.col(point) = constraint.linear.points.col(point) -
-                                problem_.targets[static_cast<std::size_t>(point)].col(frame);
-  });
-  if (isSought(frame)) lift(constraint);
+  constraint.off.resize(0);
+  constraint.of_places.resize(0, problem_.model.nv);
+  if (!isSought(constraint.frame)) return;
+  const std::uint32_t held = problem_.held[static_cast<std::size_t>(constraint.frame)];
+  const auto& bodies = linearizer_.bodies();
+  for (std::size_t body = 0; body < bodies.size(); ++body)
+    if (const std::uint32_t points = bodies[body].points & held; points != 0)
+      hold(constraint, body, points);
+  lift(constraint);
 }
 
-// Finds points in the air that are below their floor. Costs leave those that they lift a little
-// below, and what is above needs none.
+// Asks for the places of points of a body. Since it is rigid, the squares of how far its n points
+// are off are n times that of their centre, and those of three turns about axes in which their
+// second moments are diagonal, but for what no displacement of the body changes.
+void WholeBodyWindow::hold(Constraint& constraint, std::size_t body, std::uint32_t points) {
+  constexpr double kLeastMoment = 1e-12;  // [m²]
+  const LinearizedFrame& linear = constraint.linear;
+  const auto& jacobian = linear.of_bodies[body];
+  const auto findOff = [&](Index point) -> Eigen::Vector3d {
+    return linear.points.col(point) -
+           problem_.targets[static_cast<std::size_t>(point)].col(constraint.frame);
+  };
+  const double root = std::sqrt(double(__builtin_popcount(points)));
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero(), off = Eigen::Vector3d::Zero();
+  forEachPoint(points, [&](Index point) {
+    centre += linear.arms.col(point) / (root * root);
+    off += findOff(point) / root;
+  });
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();
+  forEachPoint(points, [&](Index point) {
+    const Eigen::Vector3d arm = linear.arms.col(point) - centre;
+    moments += arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose();
+    turned += arm.cross(findOff(point));
+  });
+  const Index first = constraint.off.size();
+  constraint.off.conservativeResize(first + 6);
+  constraint.of_places.conservativeResize(first + 6, Eigen::NoChange);
+  constraint.off.segment<3>(first) = off;
+  constraint.of_places.middleRows<3>(first) =
+      root * (jacobian.topRows<3>() - pinocchio::skew(centre) * jacobian.bottomRows<3>());
+  Index rows = first + 3;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+  axes.computeDirect(moments);
+  for (int k = 0; k < 3; ++k) {
+    if (!(axes.eigenvalues()[k] > kLeastMoment)) continue;
+    const double arm = std::sqrt(axes.eigenvalues()[k]);
+    const Eigen::Vector3d axis = axes.eigenvectors().col(k);
+    constraint.off[rows] = axis.dot(turned) / arm;
+    constraint.of_places.row(rows++).noalias() = arm * axis.transpose() * jacobian.bottomRows<3>();
+  }
+  constraint.off.conservativeResize(rows);
+  constraint.of_places.conservativeResize(rows, Eigen::NoChange);
+}
+
+// Asks for the heights of points in the air that are below their floor. Costs leave those that
+// they lift a little below, and what is above needs none.
 void WholeBodyWindow::lift(Constraint& constraint) {
   const Index frame = constraint.frame;
   const std::uint32_t held = problem_.held[static_cast<std::size_t>(frame)];
-  constraint.lifted = 0;
   for (Index point = 0; point < problem_.floor.rows(); ++point) {
     const double height = constraint.linear.points(2, point) - problem_.floor(point, frame);
     if (held >> point & 1u || !(height < 0.)) continue;
-    constraint.off(2, point) = height;
-    constraint.lifted |= std::uint32_t(1) << point;
+    linearizer_.linearizePoints(std::uint32_t(1) << point, constraint.linear);
+    const Index row = constraint.off.size();
+    constraint.off.conservativeResize(row + 1);
+    constraint.of_places.conservativeResize(row + 1, Eigen::NoChange);
+    constraint.off[row] = height;
+    constraint.of_places.row(row) = linearizer_.findPointJacobian(constraint.linear, point).row(2);
   }
-  linearizer_.linearizePoints(constraint.lifted, constraint.linear);
 }
 
 // Finds joints that are beyond a limit, and says how far they are beyond their own at most. Of
@@ -294,14 +335,24 @@ void WholeBodyWindow::shrink(Constraint& constraint) {
   projection_.setAnswer(constraint.answer);
   findResidual(projection_, linear, mu_, set);
   constraint.answer = projection_.answer();
-  auto& derivative = linear.own(constraint.frame).derivative;
-  forEachPoint(set, [&](Index point) {
-    const Eigen::Vector3d force = projection_.force(int(point));
-    const Eigen::Matrix3Xd of_lever =
-        linear.of_points[static_cast<std::size_t>(point)] - linear.of_com;
-    for (Index k = 0; k < of_lever.cols(); ++k)
-      derivative.col(k).tail<3>() += force.cross(Eigen::Vector3d(of_lever.col(k)));
-  });
+  auto of_moment = linear.own(constraint.frame).derivative.bottomRows<3>();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  const auto& bodies = linearizer_.bodies();
+  for (std::size_t body = 0; body < bodies.size(); ++body) {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d by_turn = Eigen::Matrix3d::Zero();  // f × (ω × r) = ((f · r) 1 - r fᵀ) ω
+    forEachPoint(set & bodies[body].points, [&](Index point) {
+      const Eigen::Vector3d own = projection_.force(int(point)), arm = linear.arms.col(point);
+      force += own;
+      by_turn += own.dot(arm) * Eigen::Matrix3d::Identity() - arm * own.transpose();
+    });
+    if (force.isZero(0.)) continue;
+    sum += force;
+    const auto& jacobian = linear.of_bodies[body];
+    of_moment +=
+        (pinocchio::skew(force) * jacobian.topRows<3>() + by_turn * jacobian.bottomRows<3>());
+  }
+  of_moment -= pinocchio::skew(sum) * linear.of_com;
 }
 
 double WholeBodyWindow::weigh(const Constraint& constraint) const {
@@ -370,12 +421,10 @@ bool WholeBodyWindow::factorize(double penalty, double penalty_of_places) {
   }
   for (const Constraint& constraint : constraints_) {
     const Index frame = constraint.frame;
-    forEachRow(constraint, [&](Index point, Index row, Index rows) {
-      const auto derivative =
-          constraint.linear.of_points[static_cast<std::size_t>(point)].middleRows(row, rows);
-      block(frame, frame).noalias() +=
-          differ(frame).duration * hold_ * derivative.transpose() * derivative;
-    });
+    if (constraint.off.size() > 0)
+      block(frame, frame)
+          .selfadjointView<Eigen::Lower>()
+          .rankUpdate(constraint.of_places.transpose(), differ(frame).duration * hold_);
     const double weight = weigh(constraint);
     const auto& terms = constraint.linear.terms;
     for (std::size_t i = 0; i < terms.size(); ++i)
@@ -412,14 +461,9 @@ void WholeBodyWindow::iterate(bool with_costs, Eigen::MatrixXd& change) {
   if (with_costs) addCosts(change);
   for (const Constraint& constraint : constraints_) {
     const Index frame = constraint.frame;
-    forEachRow(constraint, [&](Index point, Index row, Index rows) {
+    if (constraint.off.size() > 0)
       step_.col(frame - first_).noalias() -=
-          differ(frame).duration * hold_ *
-          constraint.linear.of_points[static_cast<std::size_t>(point)]
-              .middleRows(row, rows)
-              .transpose() *
-          constraint.off.col(point).segment(row, rows);
-    });
+          differ(frame).duration * hold_ * constraint.of_places.transpose() * constraint.off;
     const Vector6 off = weigh(constraint) * (constraint.moved - constraint.given + constraint.dual);
     for (const auto& term : constraint.linear.terms)
       if (isSought(term.frame))
@@ -437,11 +481,8 @@ void WholeBodyWindow::iterate(bool with_costs, Eigen::MatrixXd& change) {
     for (const auto& term : constraint.linear.terms)
       if (isSought(term.frame))
         constraint.moved.noalias() += term.derivative * step_.col(term.frame - first_);
-    forEachRow(constraint, [&](Index point, Index row, Index rows) {
-      constraint.off.col(point).segment(row, rows).noalias() +=
-          constraint.linear.of_points[static_cast<std::size_t>(point)].middleRows(row, rows) *
-          step_.col(constraint.frame - first_);
-    });
+    if (constraint.off.size() > 0)
+      constraint.off.noalias() += constraint.of_places * step_.col(constraint.frame - first_);
   }
   for (Pin& pin : pins_) pin.off += step(pin);
 }

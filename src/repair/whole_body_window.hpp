@@ -60,8 +60,8 @@ class WholeBodyWindow {
   struct Constraint {
     Eigen::Index frame;
     LinearizedFrame linear;
-    std::uint32_t lifted = 0;  // points that are not held, and are below their floor
-    Eigen::Matrix3Xd off;      // of points from their targets; of lifted ones, z only counts
+    Eigen::MatrixXd of_places;  // derivatives of what is asked of places, rows × nv
+    Eigen::VectorXd off;        // and by how much they are off
     Vector6 moved, given, dual;
     ConeProjection::Answer answer;
   };
@@ -79,6 +79,7 @@ class WholeBodyWindow {
   void begin(Eigen::Index first, Eigen::Index behind, Eigen::Index asked);
   double linearize(const Eigen::MatrixXd& q);
   void place(Constraint& constraint);
+  void hold(Constraint& constraint, std::size_t body, std::uint32_t points);
   void lift(Constraint& constraint);
   void shrink(Constraint& constraint);
   double pin(const Eigen::MatrixXd& q);
@@ -98,9 +99,6 @@ class WholeBodyWindow {
   double weigh(const Constraint& constraint) const;
   double weighChange(Eigen::Index frame) const;
   Eigen::VectorXd weighAcceleration(Eigen::Index frame) const;
-  template <class Function>
-  void forEachRow(const Constraint& constraint, Function act) const;
-
   const WholeBodyProblem& problem_;
   const RepairSettings& settings_;
   MotionLinearizer linearizer_;
