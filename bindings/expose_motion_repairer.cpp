@@ -119,6 +119,8 @@ void exposeMotionRepairer() {
       .add_property("stances", &getStances, "A RepairedStance for each, of the last rung")
       .def_readonly("ground_offset", &MotionRepair::ground_offset,
                     "By how much all of it was lifted, besides these changes [m]")
+      .def_readonly("ground_tilt", &MotionRepair::ground_tilt,
+                    "By how much all of it was turned before that, so that a slope is level [rad]")
       .def_readonly("stretch", &MotionRepair::stretch, "By which factor time was stretched")
       .add_property("steps", &getSteps, "A RepairStep for each rung")
       .add_property("reasons", &getReasons, "A RepairReason for all that is left")

@@ -121,7 +121,7 @@ BOOST_AUTO_TEST_CASE(derivatives_are_those_of_finite_differences) {
           BOOST_TEST(close((more.com - less.com) / (2. * size), linear.of_com.col(k), 1e-7));
           for (Index point = 0; point < 3; ++point)
             BOOST_TEST(close((more.points.col(point) - less.points.col(point)) / (2. * size),
-                             some.findPointJacobian(linear, point).col(k), 1e-7));
+                             some.linearizer.findPointJacobian(linear, point).col(k), 1e-7));
         }
     }
   }

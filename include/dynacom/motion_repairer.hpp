@@ -45,7 +45,8 @@ DYNACOM_EXPORT const char* to_string(RepairOutcome outcome);
 
 /// A rung of the ladder, in their order.
 enum class RepairRung {
-  Ground,    ///< all of it lifted to the height that the ground is told to have
+  Ground,    ///< all of it lifted to the height that the ground is told to have, after it was
+             ///< turned such that a slope which all stances share is level
   Filter,    ///< what was recorded is noisy, and was filtered
   Schedule,  ///< contacts, as they are in a motion that is exact
   Balance,   ///< wrenches within reach
@@ -105,6 +106,7 @@ struct MotionRepair {
   Eigen::Index missing_before = 0, missing = 0;
   std::vector<RepairedStance> stances;  ///< of the last rung
   double ground_offset = 0.;            ///< by which all was lifted, besides these changes [m]
+  double ground_tilt = 0.;              ///< by which it was turned before that [rad]
   double stretch = 1.;                  ///< of time
   std::vector<RepairStep> steps;
   /// Of `Repaired` and `Feasible` none. Codes are those of faults, and `contact_needed` where

@@ -42,6 +42,7 @@ def repair_summary(robot: Robot, repair: MotionRepair) -> dict[str, Any]:
         "missing": _missing(after, repair.missing),
         "stretch": repair.stretch,
         "ground_offset": repair.ground_offset,
+        "ground_tilt": repair.ground_tilt,
         "root": _change(repair, repair.root),
         "turn": _change(repair, repair.turn),
         "joints": _change(repair, repair.joints) | {"joint": repair.joints.joint or None},

@@ -124,6 +124,8 @@ def repair_table(summary: dict[str, Any]) -> Table:
         )
     if repair["ground_offset"] != 0.0:
         table.add_row("Lifted to the ground", f"by {_millimetres(repair['ground_offset'])}")
+    if repair["ground_tilt"] != 0.0:
+        table.add_row("Turned to the ground", f"by {_degrees(repair['ground_tilt'])}")
     if repair["stretch"] != 1.0:
         table.add_row("Time stretched", f"by a factor of {repair['stretch']:g}")
     table.add_section()

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "dynacom/motion_repairer.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -59,7 +60,9 @@ constexpr double kFarther = 1.5, kFartherBy = 0.003;
 constexpr double kWithinLimits = 1e-9;
 // A motion whose joints are accelerated so many times as much as before, and as one that is calm
 // [rad/s²], RMS, is worse.
-constexpr double kWilder = 3., kCalm = 1.;
+constexpr double kWilder = 3., kCalm = 3.;
+// What stands no farther from where it is to be is there [m].
+constexpr double kSamePlace = 1e-3;
 // By which factors time is stretched.
 constexpr double kStretches[] = {1.1, 1.25, 1.5, 2., 3., 4.};
 
@@ -78,6 +81,20 @@ Index countMissing(const MotionExamination& found) {
 
 int rank(MotionOutcome outcome) {
   return outcome == MotionOutcome::Feasible ? 2 : outcome == MotionOutcome::Repairable ? 1 : 0;
+}
+
+// Turns a motion about the origin such that a slope becomes level.
+// @return  by how much [rad]
+double level(const Eigen::Vector2d& slope, Eigen::MatrixXd& q) {
+  if (slope.isZero(0.)) return 0.;
+  const auto turn = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d(-slope.x(), -slope.y(), 1.),
+                                                       Eigen::Vector3d::UnitZ());
+  for (Index frame = 0; frame < q.cols(); ++frame) {
+    auto root = q.col(frame).head<7>();
+    root.head<3>() = turn * Eigen::Vector3d(root.head<3>());
+    root.tail<4>() = (turn * Eigen::Quaterniond(Eigen::Vector4d(root.tail<4>()))).coeffs();
+  }
+  return std::atan(slope.norm());
 }
 
 RepairChange summarize(const Eigen::RowVectorXd& sizes) {
@@ -130,6 +147,12 @@ struct MotionRepairer::Workspace {
     return settings;
   }
 
+  // Whether nothing is to be done, or can be.
+  bool isLeft(const MotionExamination& found) const {
+    return found.verdict.outcome == MotionOutcome::Unknown ||
+           (found.verdict.isFeasible() && !(settings.strict && countMissing(found) > 0));
+  }
+
   const DynaCoM robot;
   const RepairerSettings settings;
   const MotionExaminer recorded, plain, exact;
@@ -141,22 +164,29 @@ struct MotionRepairer::Workspace {
 // One motion, at one pace.
 class MotionRepairer::Workspace::Ladder {
  public:
-  // @param is_left  whether a motion that is feasible is left as it is
-  Ladder(const Workspace& workspace, const RecordedMotion& recorded, MotionExamination before,
-         bool is_left)
-      : workspace_(workspace),
-        settings_(workspace.settings),
-        recorded_(recorded),
-        is_left_(is_left) {
+  Ladder(const Workspace& workspace, const RecordedMotion& recorded, MotionExamination before)
+      : workspace_(workspace), settings_(workspace.settings), recorded_(recorded) {
     found_.before = std::move(before);
     found_.missing_before = countMissing(found_.before);
   }
 
+  // Of a motion that stays as it was.
+  MotionRepair leave() {
+    found_.recorded = recorded_;
+    found_.after = found_.filtered = found_.before;
+    found_.change.setZero(model().nv, recorded_.time.size());
+    found_.missing = found_.missing_before;
+    found_.outcome = RepairOutcome::Feasible;
+    if (found_.before.verdict.outcome == MotionOutcome::Unknown) {
+      found_.outcome = RepairOutcome::NotRepaired;
+      found_.reasons.push_back(
+          {"too_short", internal::kNaN, "there are too few frames whose accelerations are known"});
+    }
+    found_.joint_excess_before = found_.joint_excess = findExcess(recorded_.q);
+    return std::move(found_);
+  }
+
   MotionRepair climb() {
-    const MotionOutcome outcome = found_.before.verdict.outcome;
-    const bool is_fine = is_left_ && outcome == MotionOutcome::Feasible &&
-                         !(settings_.strict && found_.missing_before > 0);
-    if (is_fine || outcome == MotionOutcome::Unknown) return std::move(leave());
     const Motion& origin = found_.before.derived.motion;
     if (found_.before.derived.cutoff > 0.) {
       const RepairChange moved = summarize((origin.q - recorded_.q).topRows<3>().colwise().norm());
@@ -193,25 +223,9 @@ class MotionRepairer::Workspace::Ladder {
     return {recorded_.time, q, {}, {}, recorded_.schedule, true};
   }
 
-  // As it was.
-  MotionRepair& leave() {
-    found_.recorded = recorded_;
-    found_.after = found_.filtered = found_.before;
-    found_.change.setZero(model().nv, recorded_.time.size());
-    found_.missing = found_.missing_before;
-    found_.outcome = RepairOutcome::Feasible;
-    if (found_.before.verdict.outcome == MotionOutcome::Unknown) {
-      found_.outcome = RepairOutcome::NotRepaired;
-      found_.reasons.push_back(
-          {"too_short", internal::kNaN, "there are too few frames whose accelerations are known"});
-    }
-    found_.joint_excess_before = found_.joint_excess = findExcess(recorded_.q);
-    return found_;
-  }
-
   // As it was, since all that was tried is worse.
   MotionRepair giveUp() {
-    leave();
+    found_ = leave();
     found_.outcome = RepairOutcome::NotRepaired;
     explain();
     found_.reasons.push_back({"not_better", internal::kNaN,
@@ -453,7 +467,6 @@ class MotionRepairer::Workspace::Ladder {
   const Workspace& workspace_;
   const RepairerSettings& settings_;
   const RecordedMotion& recorded_;
-  const bool is_left_;
   MotionRepair found_ = {};
 };
 
@@ -472,34 +485,48 @@ const RepairerSettings& MotionRepairer::getSettings() const { return workspace_-
 
 MotionRepair MotionRepairer::repair(const RecordedMotion& recorded) const {
   const Workspace& workspace = *workspace_;
-  MotionRepair found =
-      Workspace::Ladder(workspace, recorded, workspace.recorded.examine(recorded), true).climb();
-  if (found.before.verdict.outcome == MotionOutcome::Unknown) return found;
-  // Another rung before all others, if that leads to the end.
-  const auto tryOther = [&](const RecordedMotion& other, RepairStep step) {
-    MotionRepair climbed =
-        Workspace::Ladder(workspace, other, workspace.plain.examine(other), false).climb();
-    if (climbed.outcome != RepairOutcome::Repaired) return;
-    climbed.missing_before = found.missing_before;
-    climbed.before = std::move(found.before);
-    climbed.steps.insert(climbed.steps.begin(), step);
-    found = std::move(climbed);
-  };
+  MotionExamination before = workspace.recorded.examine(recorded);
   RecordedMotion other = {recorded.time, recorded.q, {}, {}, recorded.schedule, recorded.is_exact};
-  if (found.outcome == RepairOutcome::NotRepaired && workspace.anywhere) {
-    const double level = workspace.anywhere->examine(recorded).terrain.level;
+  // Another rung before all others, if that leads to the end.
+  const auto climbAfter = [&](RepairStep step) {
+    std::optional<MotionRepair> climbed =
+        Workspace::Ladder(workspace, other, workspace.plain.examine(other)).climb();
+    if (climbed->outcome != RepairOutcome::Repaired)
+      climbed.reset();
+    else
+      climbed->steps.insert(climbed->steps.begin(), step);
+    return climbed;
+  };
+  const auto goOnFrom = [](MotionRepair climbed, MotionExamination first) {
+    climbed.before = std::move(first);
+    climbed.missing_before = countMissing(climbed.before);
+    return climbed;
+  };
+  if (workspace.isLeft(before)) return Workspace::Ladder(workspace, recorded, before).leave();
+  if (workspace.anywhere) {
+    MotionExamination anywhere = workspace.anywhere->examine(other);
+    const double tilt = level(anywhere.inference.slope, other.q);
+    if (tilt > 0.) anywhere = workspace.anywhere->examine(other);
+    const double height = anywhere.terrain.level;
     const double ground = workspace.settings.examination.detection.ground_height;
-    RecordedMotion lifted = other;
-    lifted.q.row(2).array() += ground - level;
-    tryOther(lifted, {RepairRung::Ground, level - ground, 0., true});
-    if (found.outcome != RepairOutcome::NotRepaired) found.ground_offset = ground - level;
+    other.q.row(2).array() += ground - height;
+    if (tilt > 0. || std::abs(height - ground) > kSamePlace)
+      if (auto found = climbAfter({RepairRung::Ground, height - ground, 0., true})) {
+        found->ground_offset = ground - height;
+        found->ground_tilt = tilt;
+        return goOnFrom(std::move(*found), std::move(before));
+      }
+    other.q = recorded.q;
   }
+  MotionRepair found = Workspace::Ladder(workspace, recorded, std::move(before)).climb();
   for (const double factor : kStretches) {
     if (found.outcome != RepairOutcome::NotRepaired || factor > workspace.settings.largest_stretch)
       break;
     other.time = recorded.time[0] + factor * (recorded.time.array() - recorded.time[0]);
-    tryOther(other, {RepairRung::Time, 1., factor, true});
-    if (found.outcome != RepairOutcome::NotRepaired) found.stretch = factor;
+    if (auto slower = climbAfter({RepairRung::Time, 1., factor, true})) {
+      slower->stretch = factor;
+      return goOnFrom(std::move(*slower), std::move(found.before));
+    }
   }
   return found;
 }

@@ -20,8 +20,8 @@ namespace {
 // then.
 constexpr double kPenalty = 2000., kFlight = 300., kRelaxation = 1.6;
 constexpr int kRounds = 2, kIterations = 12;
-// How often it does where feet or joints have to be moved, which is farther.
-constexpr int kFarRounds = 5, kFarIterations = 5;
+// The same where feet or joints have to be moved, which is farther.
+constexpr int kFarRounds = 5, kFarIterations = 8;
 // Then, costs count no more: the nearest motion within the cones, in which points and joints that
 // are held stay as they are, with larger penalties.
 constexpr double kPolish = 100., kPolishPlaces = 100.;
@@ -78,11 +78,13 @@ void WholeBodyWindow::solve(Index first, Index behind, Index asked, Eigen::Matri
   const double before = measureLack(q, first, std::min(behind, asked));
   begin(first, behind, asked);
   const bool is_far = !problem_.joints.empty() || problem_.floor.rows() > 0;
-  for (int round = 0; round < (is_far ? kFarRounds : kRounds); ++round) {
+  const int rounds = is_far ? kFarRounds : kRounds;
+  const int iterations = is_far ? kFarIterations : kIterations;
+  for (int round = 0; round < rounds; ++round) {
     linearize(q);
     if (round == 0) restart();
     if (!factorize(kPenalty, 1.)) break;
-    for (int k = 0; k < (is_far ? kFarIterations : kIterations); ++k) {
+    for (int k = 0; k < iterations; ++k) {
       iterate(true, change);
       project(true);
     }

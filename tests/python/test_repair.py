@@ -359,6 +359,31 @@ def test_time_may_be_stretched(anymal, tmp_path):
 # Settings.
 
 
+def test_a_tilted_ground_is_levelled(talos, tmp_path):
+    """A walk in a world that is turned by 8 degrees, on ground that is told to be flat."""
+    with np.load(WALKS / "talos_walk.npz") as file:
+        time, q = file["t"], file["q"]
+    tilt = 0.14
+    turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, tilt, 0.0), np.array([0.0, 0.0, 0.02]))
+    tilted = q.copy()
+    for row in tilted:
+        row[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(row[:7]))
+    np.savez(tmp_path / "tilted.npz", t=time, q=tilted)
+    options = AnalysisOptions()
+    options.detection.ground_height = 0.0
+    report = dynacom.repair(tmp_path / "tilted.npz", talos, options=options)
+    assert report.before.verdict.outcome != "feasible"
+    assert report.outcome == "repaired"
+    assert report.repair.steps[0].rung == "ground"
+    assert_allclose(report.repair.ground_tilt, tilt, atol=0.005)
+    # What is left is the walk itself.
+    assert report.repair.root.largest < 0.002
+    assert_allclose(report.repair.recorded.q[:, 2:7], q[:, 2:7], atol=0.01)
+    report.save(tmp_path / "out", page=False)
+    summary = json.loads((tmp_path / "out/summary.json").read_text())
+    assert summary["repair"]["ground_tilt"] == report.repair.ground_tilt
+
+
 def test_settings_reach_the_repairer(talos, tmp_path):
     path = write_walk(tmp_path / "walk.npz", talos, 2.0)
     options = AnalysisOptions()
