@@ -72,16 +72,15 @@ bool isMissing(const MotionExamination& found, Index frame) {
   return !(found.analysis.residual.col(frame).norm() <= kGiven * found.statistics.weight);
 }
 
-Index countMissing(const MotionExamination& found) {
-  Index count = 0;
+// Frames.
+std::vector<Index> listMissing(const MotionExamination& found) {
+  std::vector<Index> missing;
   for (Index frame = 0; frame < found.analysis.time.size(); ++frame)
-    if (isMissing(found, frame)) ++count;
-  return count;
+    if (isMissing(found, frame)) missing.push_back(frame);
+  return missing;
 }
 
-int rank(MotionOutcome outcome) {
-  return outcome == MotionOutcome::Feasible ? 2 : outcome == MotionOutcome::Repairable ? 1 : 0;
-}
+Index countMissing(const MotionExamination& found) { return Index(listMissing(found).size()); }
 
 // Turns a motion about the origin such that a slope becomes level.
 // @return  by how much [rad]
@@ -95,6 +94,32 @@ double level(const Eigen::Vector2d& slope, Eigen::MatrixXd& q) {
     root.tail<4>() = (turn * Eigen::Quaterniond(Eigen::Vector4d(root.tail<4>()))).coeffs();
   }
   return std::atan(slope.norm());
+}
+
+// Of a motion, what counts against others.
+struct Standing {
+  Index missing;  // frames
+  double lack;    // of forces [m g] and moments [m g m], RMS
+  int rank;       // of its verdict, the higher the better
+  bool is_carried;
+  double jolt;   // accelerations of joints, RMS
+  double slide;  // of contacts [m/s]
+
+  bool isFeasible() const { return rank == 2; }
+};
+
+Standing judge(const MotionExamination& found) {
+  const MotionStatistics& statistics = found.statistics;
+  const auto joints = found.derived.motion.a.bottomRows(found.derived.motion.a.rows() - 6);
+  const MotionOutcome outcome = found.verdict.outcome;
+  return {countMissing(found),
+          std::hypot(statistics.residual_force_rms, statistics.residual_torque_rms),
+          outcome == MotionOutcome::Feasible     ? 2
+          : outcome == MotionOutcome::Repairable ? 1
+                                                 : 0,
+          found.inference.schedule.active.any(),
+          joints.size() == 0 ? 0. : std::sqrt(joints.squaredNorm() / double(joints.size())),
+          found.verdict[MotionFault::FootSliding].worst};
 }
 
 RepairChange summarize(const Eigen::RowVectorXd& sizes) {
@@ -167,7 +192,8 @@ class MotionRepairer::Workspace::Ladder {
   Ladder(const Workspace& workspace, const RecordedMotion& recorded, MotionExamination before)
       : workspace_(workspace), settings_(workspace.settings), recorded_(recorded) {
     found_.before = std::move(before);
-    found_.missing_before = countMissing(found_.before);
+    before_ = judge(found_.before);
+    found_.missing_before = before_.missing;
   }
 
   // Of a motion that stays as it was.
@@ -207,14 +233,13 @@ class MotionRepairer::Workspace::Ladder {
     ContactInference inference;
   };
 
-  // What repairMotion() found, and how that is judged, as an exact motion.
+  // What repairMotion() found, and what is kept of how that is judged, as an exact motion.
   struct Attempt {
-    Eigen::MatrixXd change;
+    Eigen::MatrixXd q, change;
     std::vector<RepairedStance> stances;
-    MotionExamination found;
-    Index missing = 0;
-
-    const Eigen::MatrixXd& q() const { return found.derived.motion.q; }
+    Contacts contacts;
+    std::vector<Index> missing;  // frames
+    Standing standing;
   };
 
   const pinocchio::Model& model() const { return workspace_.robot.getModel(); }
@@ -254,9 +279,9 @@ class MotionRepairer::Workspace::Ladder {
     RepairSettings settings = settings_.repair;
     settings.feet = settings.joints = false;
     Attempt attempt = repeat(settings, contacts, found_.before.derived.motion.q);
-    const bool is_kept = !isWorse(attempt, found_.before, found_.missing_before);
+    const bool is_kept = !isWorse(attempt.standing, before_);
     found_.steps.push_back(
-        {RepairRung::Balance, double(found_.missing_before), double(attempt.missing), is_kept});
+        {RepairRung::Balance, double(before_.missing), double(attempt.standing.missing), is_kept});
     if (!is_kept) return std::nullopt;
     return attempt;
   }
@@ -265,49 +290,29 @@ class MotionRepairer::Workspace::Ladder {
   // alone has not led to where contacts are found again, feet that are level may.
   void standAndLimit(const Contacts& contacts, std::optional<Attempt>& best) {
     const Eigen::MatrixXd& origin = found_.before.derived.motion.q;
-    const bool is_balanced = best && best->missing == 0;
+    const bool is_balanced = best && best->missing.empty();
     const bool are_limits_wrong =
-        settings_.repair.joints && findExcess(best ? best->q() : origin) > kWithinLimits;
-    const bool are_feet_wrong =
-        settings_.repair.feet && !(best && best->found.verdict.isFeasible());
+        settings_.repair.joints && findExcess(best ? best->q : origin) > kWithinLimits;
+    const bool are_feet_wrong = settings_.repair.feet && !(best && best->standing.isFeasible());
     if (best && !are_limits_wrong && !are_feet_wrong) return;
-    Attempt attempt = is_balanced ? repeat(settings_.repair,
-                                           {best->found.links, best->found.inference}, best->q())
+    Attempt attempt = is_balanced ? repeat(settings_.repair, best->contacts, best->q)
                                   : repeat(settings_.repair, contacts, origin);
     const bool is_kept =
-        isSmall(attempt.change) && (best ? !isWorse(attempt, best->found, best->missing)
-                                         : !isWorse(attempt, found_.before, found_.missing_before));
+        isSmall(attempt.change) && !isWorse(attempt.standing, best ? best->standing : before_);
     if (settings_.repair.feet)
-      found_.steps.push_back(
-          {RepairRung::Feet, findSlide(found_.before), findSlide(attempt.found), is_kept});
+      found_.steps.push_back({RepairRung::Feet, before_.slide, attempt.standing.slide, is_kept});
     if (settings_.repair.joints)
       found_.steps.push_back(
-          {RepairRung::Joints, findExcess(origin), findExcess(attempt.q()), is_kept});
+          {RepairRung::Joints, findExcess(origin), findExcess(attempt.q), is_kept});
     if (is_kept) best = std::move(attempt);
   }
 
   // Whether something is lost against another motion: wrenches, the verdict, all contacts, or what
   // was smooth.
-  bool isWorse(const Attempt& attempt, const MotionExamination& other, Index missing) const {
-    const MotionExamination& found = attempt.found;
-    const auto lackOf = [](const MotionExamination& some) {
-      return std::hypot(some.statistics.residual_force_rms, some.statistics.residual_torque_rms);
-    };
-    const auto carries = [](const MotionExamination& some) {
-      return some.inference.schedule.active.any();
-    };
-    const auto joltOf = [&](const MotionExamination& some) {
-      const auto joints = some.derived.motion.a.bottomRows(model().nv - 6);
-      return joints.size() == 0 ? 0. : std::sqrt(joints.squaredNorm() / double(joints.size()));
-    };
-    return attempt.missing > missing || lackOf(found) > lackOf(other) + kGiven ||
-           rank(found.verdict.outcome) < rank(other.verdict.outcome) ||
-           (carries(other) && !carries(found)) ||
-           joltOf(found) > kWilder * (joltOf(found_.before) + kCalm);
-  }
-
-  static double findSlide(const MotionExamination& found) {
-    return found.verdict[MotionFault::FootSliding].worst;
+  bool isWorse(const Standing& found, const Standing& other) const {
+    return found.missing > other.missing || found.lack > other.lack + kGiven ||
+           found.rank < other.rank || (other.is_carried && !found.is_carried) ||
+           found.jolt > kWilder * (before_.jolt + kCalm);
   }
 
   double findExcess(const Eigen::MatrixXd& q) const {
@@ -324,18 +329,14 @@ class MotionRepairer::Workspace::Ladder {
   Attempt repeat(const RepairSettings& settings, const Contacts& contacts,
                  const Eigen::MatrixXd& start) const {
     ContactSchedule schedule = contacts.inference.schedule;
-    Attempt best = tryWith(settings, contacts.links, contacts.inference, schedule, start, true);
+    Attempt best = tryWith(settings, contacts, schedule, start, true);
     std::optional<Attempt> worse;  // the last, if it is
     for (int round = 1; round < settings_.rounds; ++round) {
       const Attempt& last = worse ? *worse : best;
-      if (last.missing == 0 && (!settings.feet || last.found.verdict.isFeasible())) break;
-      const ContactInference& inference = last.found.inference;
-      if (schedule.names == inference.schedule.names)
-        adopt(last.found, schedule);
-      else
-        schedule = inference.schedule;
-      Attempt next = tryWith(settings, last.found.links, inference, schedule, last.q(), false);
-      if (isBetter(next, best)) {
+      if (last.missing.empty() && (!settings.feet || last.standing.isFeasible())) break;
+      adopt(last, schedule);
+      Attempt next = tryWith(settings, last.contacts, schedule, last.q, false);
+      if (isBetter(next.standing, best.standing)) {
         best = std::move(next);
         worse.reset();
       } else {
@@ -345,44 +346,46 @@ class MotionRepairer::Workspace::Ladder {
     return best;
   }
 
-  // @param schedule  of contacts that may be other than those of `inference`
+  // @param schedule  of contacts that may be others than those that were found
   // @param is_new    whether costs count, or frames are mended only that are out of reach
-  Attempt tryWith(const RepairSettings& settings, const std::vector<BodyPoints>& links,
-                  const ContactInference& inference, const ContactSchedule& schedule,
-                  const Eigen::MatrixXd& start, bool is_new) const {
-    const PartRobot parts = splitContacts(workspace_.robot, links);
+  Attempt tryWith(const RepairSettings& settings, const Contacts& contacts,
+                  const ContactSchedule& schedule, const Eigen::MatrixXd& start,
+                  bool is_new) const {
+    const PartRobot parts = splitContacts(workspace_.robot, contacts.links);
     RepairGround ground;
-    if (settings.feet) ground = findRepairGround(parts.parts, inference, recorded_.time);
+    if (settings.feet) ground = findRepairGround(parts.parts, contacts.inference, recorded_.time);
     RepairedMotion repaired = repairMotion(parts, found_.before.derived.motion, schedule, settings,
                                            {}, ground, start, is_new);
-    Attempt attempt = {std::move(repaired.change), std::move(repaired.stances),
-                       workspace_.exact.examine(write(repaired.motion.q)), 0};
-    attempt.missing = countMissing(attempt.found);
-    return attempt;
+    const MotionExamination found = workspace_.exact.examine(write(repaired.motion.q));
+    return {std::move(repaired.motion.q),   std::move(repaired.change), std::move(repaired.stances),
+            {found.links, found.inference}, listMissing(found),         judge(found)};
   }
 
-  // Takes contacts that were found around frames in which they cannot give what is needed.
-  static void adopt(const MotionExamination& found, ContactSchedule& schedule) {
+  // Takes contacts that were found around frames in which they cannot give what is needed; all of
+  // them, where they are others.
+  static void adopt(const Attempt& found, ContactSchedule& schedule) {
     constexpr Index kAround = 3;
+    const ContactSchedule& other = found.contacts.inference.schedule;
+    if (schedule.names != other.names) {
+      schedule = other;
+      return;
+    }
     const Index frames = schedule.active.cols();
-    for (Index frame = 0; frame < frames; ++frame) {
-      if (!isMissing(found, frame)) continue;
+    for (const Index frame : found.missing) {
       const Index first = std::max<Index>(frame - kAround, 0);
       const Index count = std::min(frame + kAround + 1, frames) - first;
-      schedule.active.middleCols(first, count) =
-          found.inference.schedule.active.middleCols(first, count);
+      schedule.active.middleCols(first, count) = other.active.middleCols(first, count);
     }
   }
 
-  static bool isBetter(const Attempt& one, const Attempt& other) {
-    if (one.missing != other.missing) return one.missing < other.missing;
-    return rank(one.found.verdict.outcome) > rank(other.found.verdict.outcome);
+  static bool isBetter(const Standing& one, const Standing& other) {
+    return one.missing != other.missing ? one.missing < other.missing : one.rank > other.rank;
   }
 
   void finish(Attempt attempt) {
-    found_.recorded = write(attempt.q());
-    found_.after = std::move(attempt.found);
-    found_.missing = attempt.missing;
+    found_.recorded = write(attempt.q);
+    found_.after = workspace_.exact.examine(found_.recorded);
+    found_.missing = attempt.standing.missing;
     found_.stances = std::move(attempt.stances);
     found_.change = std::move(attempt.change);
     found_.root = summarize(found_.change.topRows<3>().colwise().norm());
@@ -468,6 +471,7 @@ class MotionRepairer::Workspace::Ladder {
   const RepairerSettings& settings_;
   const RecordedMotion& recorded_;
   MotionRepair found_ = {};
+  Standing before_ = {};
 };
 
 MotionRepairer::MotionRepairer(const DynaCoM& robot, const RepairerSettings& settings) {
