@@ -163,13 +163,13 @@ void exposeDynaCoM() {
           "on it.")
       .def(
           "computeDynamics", &computeDynamicsOnPlane,
-          (bp::arg("self"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
-           bp::arg("extWrench") = no_wrench, bp::arg("ground")),
+          (bp::arg("self"), bp::arg("q"), bp::arg("v"), bp::arg("a"), bp::arg("extWrench"),
+           bp::arg("ground")),
           "The same on any plane, a slope or a wall: the centre of pressure is that of the ground\n"
           "wrench by (21). Nothing is distributed.\n\n"
           "ground: GroundPlane. Raises ValueError unless it is valid.")
       .def("computeDynamics", &computeDynamicsOfDataOnPlane,
-           (bp::arg("self"), bp::arg("data"), bp::arg("extWrench") = no_wrench, bp::arg("ground")),
+           (bp::arg("self"), bp::arg("data"), bp::arg("extWrench"), bp::arg("ground")),
            "The same on any plane, of a motion that is known.")
       .def("getGroundCoMForce", &DynaCoM::getGroundCoMForce, bp::arg("self"), Copied(),
            "Force that the ground must give, (3,) [N].")
@@ -213,7 +213,7 @@ void exposeDynaCoM() {
            "computeDynamics, then computeNL(omega).")
       .def("computeNL", &computeNLOnPlane,
            (bp::arg("self"), bp::arg("omega"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
-            bp::arg("extWrench") = no_wrench, bp::arg("ground")),
+            bp::arg("extWrench"), bp::arg("ground")),
            "The same on any plane. ground: GroundPlane.")
       .def("getVRP", &DynaCoM::getVRP, bp::arg("self"), Copied(),
            "Virtual repellent point, (2,) [m].")
