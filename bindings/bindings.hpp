@@ -20,6 +20,7 @@ namespace bp = boost::python;
 
 void takeNumpyScalars();
 void exposeCentroidal();
+void exposeGroundPlane();
 void exposeContactBase();
 void exposeContactPoint();
 void exposeContact6D();

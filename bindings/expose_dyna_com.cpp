@@ -39,9 +39,25 @@ void computeDynamicsOfData(DynaCoM& self, const pinocchio::Data& data, const bp:
   self.computeDynamics(data, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
+void computeDynamicsOnPlane(DynaCoM& self, const VectorRef& q, const VectorRef& v,
+                            const VectorRef& a, const bp::object& ext_wrench,
+                            const GroundPlane& ground) {
+  self.computeDynamics(q, v, a, toVector<6>("extWrench", ext_wrench), ground);
+}
+
+void computeDynamicsOfDataOnPlane(DynaCoM& self, const pinocchio::Data& data,
+                                  const bp::object& ext_wrench, const GroundPlane& ground) {
+  self.computeDynamics(data, toVector<6>("extWrench", ext_wrench), ground);
+}
+
 void computeNL(DynaCoM& self, double omega, const VectorRef& q, const VectorRef& v,
                const VectorRef& a, const bp::object& ext_wrench, bool flat_horizontal_ground) {
   self.computeNL(omega, q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
+}
+
+void computeNLOnPlane(DynaCoM& self, double omega, const VectorRef& q, const VectorRef& v,
+                      const VectorRef& a, const bp::object& ext_wrench, const GroundPlane& ground) {
+  self.computeNL(omega, q, v, a, toVector<6>("extWrench", ext_wrench), ground);
 }
 
 DistributionStatus distributeForce(DynaCoM& self, const bp::object& force, const bp::object& torque,
@@ -100,7 +116,8 @@ void exposeDynaCoM() {
       .def("setGroundHeight", &DynaCoM::setGroundHeight, (bp::arg("self"), bp::arg("groundHeight")),
            "Height of the flat horizontal ground, finite [m].")
       .def("getMinimalVerticalForce", &DynaCoM::getMinimalVerticalForce, bp::arg("self"),
-           "Below this vertical force a centre of pressure means nothing [N]; 1 by default.")
+           "Below this vertical force a centre of pressure means nothing, nor what is on a\n"
+           "GroundPlane below this force along its normal [N]; 1 by default.")
       .def("setMinimalVerticalForce", &DynaCoM::setMinimalVerticalForce,
            (bp::arg("self"), bp::arg("minimalVerticalForce")),
            "ValueError unless minimalVerticalForce is finite and > 0 [N].")
@@ -144,6 +161,16 @@ void exposeDynaCoM() {
           "Raises ValueError if data has another number of joints, or extWrench another size;\n"
           "NotReadyError if data's mass is not the robot's, because that algorithm has never run\n"
           "on it.")
+      .def(
+          "computeDynamics", &computeDynamicsOnPlane,
+          (bp::arg("self"), bp::arg("q"), bp::arg("v"), bp::arg("a"), bp::arg("extWrench"),
+           bp::arg("ground")),
+          "The same on any plane, a slope or a wall: the centre of pressure is that of the ground\n"
+          "wrench by (21). Nothing is distributed.\n\n"
+          "ground: GroundPlane. Raises ValueError unless it is valid.")
+      .def("computeDynamics", &computeDynamicsOfDataOnPlane,
+           (bp::arg("self"), bp::arg("data"), bp::arg("extWrench"), bp::arg("ground")),
+           "The same on any plane, of a motion that is known.")
       .def("getGroundCoMForce", &DynaCoM::getGroundCoMForce, bp::arg("self"), Copied(),
            "Force that the ground must give, (3,) [N].")
       .def("getGroundCoMTorque", &DynaCoM::getGroundCoMTorque, bp::arg("self"), Copied(),
@@ -156,9 +183,19 @@ void exposeDynaCoM() {
       .def("getAMVariation", &DynaCoM::getAMVariation, bp::arg("self"), Copied(),
            "Its rate, (3,) [N·m].")
       .def("getCoP", &DynaCoM::getCoP, bp::arg("self"), Copied(),
-           "Centre of pressure, (2,) [m]; NaN unless isCoPDefined().")
+           "x and y of the centre of pressure, (2,) [m]; NaN unless isCoPDefined().")
+      .def("getCoP3D", &DynaCoM::getCoP3D, bp::arg("self"), Copied(),
+           "The whole of it, (3,) [m]: on the ground's plane, or, on uneven ground, the mean of\n"
+           "the contacts' centres of pressure by vertical force.")
       .def("isCoPDefined", &DynaCoM::isCoPDefined, bp::arg("self"),
-           "Whether the vertical force is getMinimalVerticalForce() or more.")
+           "Whether the vertical force, on a GroundPlane that along its normal, is\n"
+           "getMinimalVerticalForce() or more.")
+      .def("getCMP", &DynaCoM::getCMP, (bp::arg("self"), bp::arg("plane")),
+           "Centroidal moment pivot on a plane, (22), (3,) [m]: where the line along the ground's\n"
+           "force through the centre of mass meets it; on uneven ground the force that the "
+           "contacts\n"
+           "achieve. NaN where it is below getMinimalVerticalForce() along the normal.\n\n"
+           "plane: GroundPlane. Raises ValueError unless it is valid.")
       .def(
           "getFeasibleACoM", &DynaCoM::getFeasibleACoM, bp::arg("self"), Copied(),
           "Acceleration of the centre of mass that the contacts can really cause, (3,) [m/s²]: by\n"
@@ -174,9 +211,17 @@ void exposeDynaCoM() {
            (bp::arg("self"), bp::arg("omega"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
             bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
            "computeDynamics, then computeNL(omega).")
+      .def("computeNL", &computeNLOnPlane,
+           (bp::arg("self"), bp::arg("omega"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
+            bp::arg("extWrench"), bp::arg("ground")),
+           "The same on any plane. ground: GroundPlane.")
       .def("getVRP", &DynaCoM::getVRP, bp::arg("self"), Copied(),
            "Virtual repellent point, (2,) [m].")
       .def("getNL", &DynaCoM::getNL, bp::arg("self"), Copied(), "Non-linearity p - v, (2,) [m].")
+      .def("getVRP3D", &DynaCoM::getVRP3D, bp::arg("self"), Copied(),
+           "Virtual repellent point, (3,) [m]; getVRP() is x and y of it.")
+      .def("getECMP", &DynaCoM::getECMP, bp::arg("self"), Copied(),
+           "Enhanced centroidal moment pivot of the last computeNL, (23), (3,) [m].")
 
       .def(
           "addContact", &DynaCoM::addContact,
@@ -238,6 +283,11 @@ void exposeDynaCoM() {
       .def("computeWrenchMargin", &DynaCoM::computeWrenchMargin, bp::arg("self"),
            "How far the last distribution's wrench is from what its contacts cannot give: a\n"
            "WrenchMargin. Takes many times as long as a distribution.")
+      .def("getZMP", &DynaCoM::getZMP, (bp::arg("self"), bp::arg("plane")),
+           "Zero-moment point of the last distribution on a plane, (3,) [m]: (21) of the wrench\n"
+           "that its contacts achieve, wherever they stand. NaN where its force along the normal\n"
+           "is below getMinimalVerticalForce().\n\n"
+           "plane: GroundPlane. Raises ValueError unless it is valid.")
       .def("getContactCoP", &DynaCoM::getContactCoP, (bp::arg("self"), bp::arg("name")),
            "A contact's centre of pressure in its surface's plane, (2,) [m]; NaN where its normal\n"
            "force is below getMinimalVerticalForce(). ValueError if the name is not known.")

@@ -30,6 +30,7 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   bp::register_exception_translator<dynacom::NotReadyError>(&translate);
   takeNumpyScalars();
   exposeCentroidal();
+  exposeGroundPlane();
   exposeContactBase();
   exposeContactPoint();
   exposeContact6D();

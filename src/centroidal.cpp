@@ -8,6 +8,22 @@
 
 namespace dynacom {
 
+namespace {
+
+template <int size>
+Eigen::Matrix<double, size, 1> finiteOrNaN(const Eigen::Matrix<double, size, 1>& point) {
+  return point.allFinite() ? point : Eigen::Matrix<double, size, 1>::Constant(internal::kNaN);
+}
+
+// (7) and (23): the point from which an acceleration a repels the CoM.
+Eigen::Vector3d repellentPoint(const CentroidalState& state, const Eigen::Vector3d& acceleration,
+                               double omega) {
+  internal::requireOmega(omega);
+  return state.com - acceleration / (omega * omega);
+}
+
+}  // namespace
+
 CentroidalState computeCentroidalState(const pinocchio::Model& model, pinocchio::Data& data,
                                        const Eigen::Ref<const Eigen::VectorXd>& q,
                                        const Eigen::Ref<const Eigen::VectorXd>& v,
@@ -60,15 +76,21 @@ Eigen::Vector2d computeFlatGroundCoP(const CentroidalWrench& groundWrench,
 }
 
 Eigen::Vector2d computeVRP(const CentroidalState& state, double omega) {
-  internal::requireOmega(omega);
-  const Eigen::Vector2d vrp = state.com.head<2>() - state.acom.head<2>() / (omega * omega);  // (7)
-  return vrp.allFinite() ? vrp : Eigen::Vector2d::Constant(internal::kNaN);
+  return finiteOrNaN<2>(repellentPoint(state, state.acom, omega).head<2>());  // (7)
+}
+
+Eigen::Vector3d computeVRP3D(const CentroidalState& state, double omega) {
+  return finiteOrNaN<3>(repellentPoint(state, state.acom, omega));  // (7)
+}
+
+Eigen::Vector3d computeECMP(const CentroidalState& state, const Eigen::Vector3d& gravity,
+                            double omega) {
+  return finiteOrNaN<3>(repellentPoint(state, state.acom - gravity, omega));  // (23)
 }
 
 Eigen::Vector2d computeDCM(const CentroidalState& state, double omega) {
   internal::requireOmega(omega);
-  const Eigen::Vector2d dcm = state.com.head<2>() + state.vcom.head<2>() / omega;  // (20)
-  return dcm.allFinite() ? dcm : Eigen::Vector2d::Constant(internal::kNaN);
+  return finiteOrNaN<2>(state.com.head<2>() + state.vcom.head<2>() / omega);  // (20)
 }
 
 }  // namespace dynacom

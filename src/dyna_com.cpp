@@ -106,6 +106,7 @@ void DynaCoM::forgetMotion() {
   ext_wrench_.setConstant(kNaN);
   feasible_ = pressing_ = state_;
   cop_ = vrp_ = nl_ = nan.head<2>();
+  cop_3d_ = vrp_3d_ = ecmp_ = distribution_com_ = nan;
   distribution_.reset();
 }
 
@@ -128,15 +129,40 @@ void DynaCoM::setMinimalVerticalForce(double minimalVerticalForce) {
 
 void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
                               const Vector6& extWrench, bool flatHorizontalGround) {
-  requireInitialized();
-  updateFrames();
-  const CentroidalState state = computeCentroidalState(model_, data_, q, v, a);
-  const bool finite = areFinite(q) && areFinite(v) && areFinite(a);
-  takeMotion(state, finite, extWrench, flatHorizontalGround);
+  readMotion(q, v, a, extWrench);
+  press(flatHorizontalGround);
+}
+
+void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                              const Vector6& extWrench, const GroundPlane& ground) {
+  ground.validate();
+  readMotion(q, v, a, extWrench);
+  pressOn(ground);
 }
 
 void DynaCoM::computeDynamics(const pinocchio::Data& data, const Vector6& extWrench,
                               bool flatHorizontalGround) {
+  readMotion(data, extWrench);
+  press(flatHorizontalGround);
+}
+
+void DynaCoM::computeDynamics(const pinocchio::Data& data, const Vector6& extWrench,
+                              const GroundPlane& ground) {
+  ground.validate();
+  readMotion(data, extWrench);
+  pressOn(ground);
+}
+
+void DynaCoM::readMotion(const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                         const Vector6& extWrench) {
+  requireInitialized();
+  updateFrames();
+  const CentroidalState state = computeCentroidalState(model_, data_, q, v, a);
+  const bool finite = areFinite(q) && areFinite(v) && areFinite(a);
+  takeMotion(state, finite, extWrench);
+}
+
+void DynaCoM::readMotion(const pinocchio::Data& data, const Vector6& extWrench) {
   requireInitialized();
   internal::requireSize("data.oMi", Eigen::Index(data.oMi.size()), Eigen::Index(model_.njoints),
                         "placements (one per joint)");
@@ -148,13 +174,12 @@ void DynaCoM::computeDynamics(const pinocchio::Data& data, const Vector6& extWre
         mass_, " kg, got ", state.mass));
   updateFrames();
   data_.oMi = data.oMi;
-  takeMotion(state, true, extWrench, flatHorizontalGround);
+  takeMotion(state, true, extWrench);
 }
 
 // What follows from a state, be it finite or not; if what it was computed from is not finite, it is
 // not to be trusted either.
-void DynaCoM::takeMotion(const CentroidalState& state, bool finite, const Vector6& extWrench,
-                         bool flatHorizontalGround) {
+void DynaCoM::takeMotion(const CentroidalState& state, bool finite, const Vector6& extWrench) {
   state_ = state;
   ext_wrench_ = extWrench;
   ground_wrench_ = computeGroundWrench(state_, settings_.gravity, ext_wrench_);
@@ -164,6 +189,7 @@ void DynaCoM::takeMotion(const CentroidalState& state, bool finite, const Vector
     // There is a motion, of which nothing is known: not even what happens to be finite.
     state_ = unknownState(mass_);
     vrp_ = nl_ = Eigen::Vector2d::Constant(kNaN);
+    vrp_3d_ = ecmp_ = Eigen::Vector3d::Constant(kNaN);
     ext_wrench_.setConstant(kNaN);
     ground_wrench_ = computeGroundWrench(state_, settings_.gravity, ext_wrench_);
   }
@@ -171,20 +197,37 @@ void DynaCoM::takeMotion(const CentroidalState& state, bool finite, const Vector
 
   feasible_ = unknownState(mass_);
   pressing_ = state_;
-  if (flatHorizontalGround) {
-    cop_ =
-        computeFlatGroundCoP(ground_wrench_, state_.com, ground_height_, minimal_vertical_force_);
-  } else {
-    distributeForce(ground_wrench_.force, ground_wrench_.torque, state_.com);
-    pressing_ = feasible_;
-    cop_ = known ? computePressureCentre() : Eigen::Vector2d(Eigen::Vector2d::Constant(kNaN));
-  }
+}
+
+void DynaCoM::press(bool flatHorizontalGround) {
+  if (flatHorizontalGround)
+    pressOn({Eigen::Vector3d(0., 0., ground_height_), Eigen::Vector3d::UnitZ()});  // (5)
+  else
+    pressByContacts();
+}
+
+void DynaCoM::pressOn(const GroundPlane& ground) {
+  setCoP(computeCoP(ground_wrench_, state_.com, ground, minimal_vertical_force_));
+}
+
+void DynaCoM::pressByContacts() {
+  distributeForce(ground_wrench_.force, ground_wrench_.torque, state_.com);
+  pressing_ = feasible_;
+  // Of a motion that is not known, contacts keep the forces of another.
+  setCoP(isFinite(state_) ? computePressureCentre() : Eigen::Vector3d::Constant(kNaN));
+}
+
+void DynaCoM::setCoP(const Eigen::Vector3d& cop) {
+  cop_3d_ = cop;
+  cop_ = cop.head<2>();
 }
 
 void DynaCoM::computeNL(double omega) {
   requireInitialized();
   if (!hasMotion()) throw NotReadyError("DynaCoM::computeNL needs computeDynamics() before");
   vrp_ = computeVRP(pressing_, omega);
+  vrp_3d_ = computeVRP3D(pressing_, omega);
+  ecmp_ = computeECMP(pressing_, settings_.gravity, omega);
   nl_ = cop_ - vrp_;  // (8)
 }
 
@@ -192,6 +235,13 @@ void DynaCoM::computeNL(double omega, const VectorRef& q, const VectorRef& v, co
                         const Vector6& extWrench, bool flatHorizontalGround) {
   internal::requireOmega(omega);  // before anything changes
   computeDynamics(q, v, a, extWrench, flatHorizontalGround);
+  computeNL(omega);
+}
+
+void DynaCoM::computeNL(double omega, const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                        const Vector6& extWrench, const GroundPlane& ground) {
+  internal::requireOmega(omega);
+  computeDynamics(q, v, a, extWrench, ground);
   computeNL(omega);
 }
 
@@ -336,6 +386,7 @@ DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForc
   Vector6 wrench;
   wrench << groundCoMForce, groundCoMTorque;
   distribution_.solve(wrench, mass_ * internal::kStandardGravity);
+  distribution_com_ = com;
 
   const DistributionResult& result = distribution_.result();
   for (std::size_t k = 0; k < result.contacts.size(); ++k)
@@ -344,6 +395,17 @@ DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForc
     feasible_ = applyGroundWrench(state_, {result.achieved.head<3>(), result.achieved.tail<3>()},
                                   settings_.gravity, ext_wrench_);
   return result.status;
+}
+
+Eigen::Vector3d DynaCoM::getZMP(const GroundPlane& plane) const {
+  const Vector6& achieved = getDistribution().achieved;
+  return computeCoP({achieved.head<3>(), achieved.tail<3>()}, distribution_com_, plane,
+                    minimal_vertical_force_);
+}
+
+Eigen::Vector3d DynaCoM::getCMP(const GroundPlane& plane) const {
+  const CentroidalWrench pressing = computeGroundWrench(pressing_, settings_.gravity, ext_wrench_);
+  return computeCMP(pressing.force, state_.com, plane, minimal_vertical_force_);
 }
 
 bool DynaCoM::isLoaded(const ContactBase& contact) const {
@@ -376,8 +438,8 @@ double DynaCoM::getContactYawUsage(const std::string& name) const {
 
 // Equation (6), with each contact's own centre of pressure p_k in the world: S (p × F ẑ) = F p, so
 // that this is the mean of the p_k, weighted by the vertical forces.
-Eigen::Vector2d DynaCoM::computePressureCentre() const {
-  Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+Eigen::Vector3d DynaCoM::computePressureCentre() const {
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
   double vertical_force = 0.;
   for (const Entry& entry : contacts_) {
     if (!entry.active) break;
@@ -385,12 +447,12 @@ Eigen::Vector2d DynaCoM::computePressureCentre() const {
     if (!cop.allFinite()) continue;
     const pinocchio::SE3 surface = entry.contact->getSurfacePose();
     const double force = surface.rotation().row(2).dot(entry.contact->appliedForce().head<3>());
-    moment += force * surface.act(Eigen::Vector3d(cop.x(), cop.y(), 0.)).head<2>();
+    moment += force * surface.act(Eigen::Vector3d(cop.x(), cop.y(), 0.));
     vertical_force += force;
   }
-  const Eigen::Vector2d centre = moment / vertical_force;
+  const Eigen::Vector3d centre = moment / vertical_force;
   if (!(vertical_force >= minimal_vertical_force_) || !centre.allFinite())
-    return Eigen::Vector2d::Constant(kNaN);
+    return Eigen::Vector3d::Constant(kNaN);
   return centre;
 }
 

@@ -172,6 +172,10 @@ BOOST_AUTO_TEST_CASE(control_loop_allocates_nothing) {
                  0);
       BOOST_TEST(allocationsIn([&] { dynacom.computeNL(3., x.q, x.v, x.a, external, false); }) ==
                  0);
+      GroundPlane slope{standing.random.vector3(), Vector3d(0.1, 0.2, 3.)};
+      BOOST_TEST(allocationsIn([&] { dynacom.computeNL(3., x.q, x.v, x.a, external, slope); }) ==
+                 0);
+      BOOST_TEST(dynacom.isCoPDefined());
       if (status == DistributionStatus::Solved) ++solved;
     }
     BOOST_TEST(solved > 10);
@@ -244,6 +248,7 @@ BOOST_AUTO_TEST_CASE(getters_that_return_references_allocate_nothing) {
                       dynacom.getAMVariation().x() + dynacom.getGroundCoMForce().x() +
                       dynacom.getGroundCoMTorque().x() + dynacom.getCoP().x() +
                       dynacom.getVRP().x() + dynacom.getNL().x() + dynacom.getFeasibleACoM().x() +
+                      dynacom.getCoP3D().x() + dynacom.getVRP3D().x() + dynacom.getECMP().x() +
                       dynacom.getFeasibleAMVariation().x() + dynacom.getMinimalVerticalForce() +
                       dynacom.getWrenchWeights()[0] + dynacom.getWarmStart() +
                       dynacom.getMaximalIterations() + dynacom.getDistribution().iterations +
@@ -260,7 +265,8 @@ BOOST_AUTO_TEST_CASE(getters_that_return_references_allocate_nothing) {
                sum += contact.toWorldForces().x() + contact.toCoMForces().x() +
                       contact.getCoP().x() + contact.getSurfacePose().translation().x() +
                       dynacom.getContactCoP(name).x() + dynacom.getContactFrictionUsage(name) +
-                      dynacom.getContactCoPMargin(name) + dynacom.getContactYawUsage(name);
+                      dynacom.getContactCoPMargin(name) + dynacom.getContactYawUsage(name) +
+                      dynacom.getCMP(GroundPlane()).x() + dynacom.getZMP(GroundPlane()).x();
              }) == 0);
   BOOST_TEST(std::isfinite(sum));
 }
@@ -373,6 +379,8 @@ BOOST_AUTO_TEST_CASE(measured_placements_and_known_motions_allocate_nothing) {
       BOOST_TEST(allocationsIn([&] { dynacom.computeDynamics(data); }) == 0);
       BOOST_TEST(allocationsIn([&] { dynacom.computeDynamics(data, Vector6::Ones(), false); }) ==
                  0);
+      BOOST_TEST(allocationsIn(
+                     [&] { dynacom.computeDynamics(data, Vector6::Ones(), GroundPlane()); }) == 0);
       BOOST_TEST(allocationsIn([&] { standing.distribute(); }) == 0);
       BOOST_TEST(allocationsIn([&] { dynacom.resetContactPose(name); }) == 0);
       BOOST_TEST(allocationsIn([&] { standing.compute(x); }) == 0);

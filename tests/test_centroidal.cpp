@@ -305,6 +305,41 @@ BOOST_AUTO_TEST_CASE(virtual_repellent_point_by_hand) {
   BOOST_TEST(close(computeVRP(someState(), 0.5), Vector2d(1. - 0.5 * 4., 2. + 1. * 4.)));
 }
 
+BOOST_AUTO_TEST_CASE(repellent_points_in_three_dimensions_by_hand) {
+  // v = c − c̈ / ω², e = c − (c̈ − g) / ω², which is g / ω² below.
+  const Vector3d gravity(0., 0., -10.);
+  BOOST_TEST(
+      close(computeVRP3D(someState(), 2.), Vector3d(1. - 0.5 / 4., 2. + 1. / 4., 0.8 - 2. / 4.)));
+  BOOST_TEST(close(computeECMP(someState(), gravity, 2.),
+                   Vector3d(1. - 0.5 / 4., 2. + 1. / 4., 0.8 - 12. / 4.)));
+}
+
+BOOST_AUTO_TEST_CASE(repellent_points_say_what_forces_there_are) {
+  Random random(11);
+  for (const auto& model : randomRobots(random, 10)) {
+    const Vector3d gravity = random.vector3(10.);
+    const double omega = random.uniform(0.5, 5.), mass = totalMass(model);
+    const CentroidalState state = stateOf(model, randomState(model, random));
+    const Vector3d vrp = computeVRP3D(state, omega), ecmp = computeECMP(state, gravity, omega);
+    BOOST_TEST(close(vrp.head<2>(), computeVRP(state, omega), 0.));
+    BOOST_TEST(close(vrp, ecmp - gravity / (omega * omega)));
+    // All forces, and those of the ground.
+    const double stiffness = mass * omega * omega;
+    const Vector3d total = mass * state.acom;
+    BOOST_TEST(close(stiffness * (state.com - vrp), total, 1e-10));
+    BOOST_TEST(
+        close(stiffness * (state.com - ecmp), computeGroundWrench(state, gravity).force, 1e-10));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(repellent_points_beyond_the_largest_numbers_are_none) {
+  CentroidalState far = someState();
+  far.acom.z() = 1e300;
+  BOOST_TEST(computeVRP(far, 1e-10).allFinite());
+  BOOST_TEST(allNaN(computeVRP3D(far, 1e-10)));
+  BOOST_TEST(allNaN(computeECMP(far, Vector3d::Zero(), 1e-10)));
+}
+
 BOOST_AUTO_TEST_CASE(divergent_component_of_motion_by_hand) {
   // ξ = c + ċ / ω, of which the derivative is ω (ξ − v).
   const CentroidalState state = someState();
@@ -324,5 +359,9 @@ BOOST_AUTO_TEST_CASE(virtual_repellent_point_wants_a_positive_omega) {
                                              {"omega", text}));
     BOOST_TEST(throws<std::invalid_argument>([&, w = omega] { computeDCM(someState(), w); },
                                              {"omega", text}));
+    BOOST_TEST(throws<std::invalid_argument>([&, w = omega] { computeVRP3D(someState(), w); },
+                                             {"omega", text}));
+    BOOST_TEST(throws<std::invalid_argument>(
+        [&, w = omega] { computeECMP(someState(), Vector3d::Zero(), w); }, {"omega", text}));
   }
 }

@@ -133,7 +133,12 @@ View everythingSeen(const DynaCoM& dynacom) {
   see("AM", dynacom.getAM().transpose());
   see("AM variation", dynacom.getAMVariation().transpose());
   see("CoP", dynacom.getCoP().transpose());
+  see("CoP in space", dynacom.getCoP3D().transpose());
   see("VRP", dynacom.getVRP().transpose());
+  see("VRP in space", dynacom.getVRP3D().transpose());
+  see("eCMP", dynacom.getECMP().transpose());
+  see("CMP", dynacom.getCMP(GroundPlane()).transpose());
+  see("ZMP", dynacom.getZMP(GroundPlane()).transpose());
   see("NL", dynacom.getNL().transpose());
   see("minimal vertical force", dynacom.getMinimalVerticalForce());
   see("CoP is defined", dynacom.isCoPDefined());
@@ -185,7 +190,8 @@ bool motionIsUnknown(const DynaCoM& dynacom) {
   for (const auto& value :
        {dynacom.getGroundCoMForce(), dynacom.getGroundCoMTorque(), dynacom.getCoM(),
         dynacom.getVCoM(), dynacom.getACoM(), dynacom.getAM(), dynacom.getAMVariation(),
-        dynacom.getFeasibleACoM(), dynacom.getFeasibleAMVariation()})
+        dynacom.getFeasibleACoM(), dynacom.getFeasibleAMVariation(), dynacom.getCoP3D(),
+        dynacom.getVRP3D(), dynacom.getECMP(), dynacom.getCMP(GroundPlane())})
     if (!allNaN(value)) return false;
   return allNaN(dynacom.getCoP()) && allNaN(dynacom.getVRP()) && allNaN(dynacom.getNL()) &&
          !dynacom.isCoPDefined();
@@ -746,6 +752,297 @@ BOOST_AUTO_TEST_CASE(out_of_reach_pressure_is_that_of_what_is_achieved) {
   compute(dynacom, x, externalFor(dynacom, x, wanted), false);
   BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::Relaxed);
   BOOST_TEST(allNaN(dynacom.getCoP()));
+}
+
+// --- Any plane ---------------------------------------------------------------------------------
+
+namespace {
+
+/// A body whose soles and points all stand on one slope, about 0.9 m below it.
+struct OnSlope {
+  explicit OnSlope(unsigned seed) : random(seed) {
+    const Vector3d axis(random.uniform(-1., 1.), random.uniform(-1., 1.), 0.);
+    const Matrix3d tilt =
+        Eigen::AngleAxisd(random.uniform(0.1, 0.4), axis.normalized()).toRotationMatrix();
+    std::vector<SE3> soles = stance(5);
+    for (SE3& sole : soles) {
+      sole.translation() = tilt * sole.translation() - Vector3d(0., 0., 0.9);
+      sole.rotation() = tilt;
+    }
+    plane = {soles[3].translation(), 2. * tilt.col(2)};
+    dynacom.initialize(singleBody(50., soles));
+    for (int i = 0; i < 5; ++i) {
+      const std::string frame = "sole" + std::to_string(i);
+      if (i < 2)
+        contacts.push_back(makeSole(frame));
+      else
+        contacts.push_back(makePoint(frame));
+      dynacom.addContact(contacts.back(), frame);
+    }
+  }
+
+  State rest() const { return restState(dynacom.getModel()); }
+  /// An external wrench with which the ground must give about the weight, as it likes to.
+  Vector6 external() {
+    Vector6 wanted = random.vector(6, 60.);
+    wanted.z() = random.uniform(300., 600.);
+    return externalFor(dynacom, rest(), wanted);
+  }
+
+  Random random;
+  GroundPlane plane;
+  DynaCoM dynacom;
+  std::vector<std::shared_ptr<ContactBase>> contacts;
+};
+
+/// Where the moment of all forces of contacts is parallel to the plane's normal, by solving for it:
+/// a point p on the plane with n × (τ − p × f) = 0, τ about the world's origin.
+Vector3d zeroMomentPoint(const std::vector<std::shared_ptr<ContactBase>>& contacts,
+                         const GroundPlane& plane) {
+  Vector6 wrench = Vector6::Zero();
+  for (const auto& contact : contacts) wrench += contact->toWorldForces();
+  const auto skew = [](const Vector3d& v) {
+    return (Matrix3d() << 0., -v.z(), v.y(), v.z(), 0., -v.x(), -v.y(), v.x(), 0.).finished();
+  };
+  const Vector3d n = plane.normal.normalized();
+  MatrixXd A(4, 3);
+  A << -skew(n) * skew(wrench.head<3>()), n.transpose();
+  VectorXd b(4);
+  b << n.cross(Vector3d(wrench.tail<3>())), n.dot(plane.point);
+  return A.colPivHouseholderQr().solve(b);
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(a_horizontal_plane_is_flat_ground) {
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    Biped flat(20 + seed), plane(20 + seed);
+    const double height = flat.random.uniform(-0.5, 0.5);
+    flat.dynacom.setGroundHeight(height);
+    plane.dynacom.setGroundHeight(height);
+    const GroundPlane ground{Vector3d(3., -2., height), Vector3d(0., 0., 2.)};
+    const State x = flat.moving();
+    const Vector6 external = flat.random.vector(6, 50.);
+    // To the last digit, and nothing is distributed.
+    compute(flat.dynacom, x, external);
+    plane.dynacom.computeDynamics(x.q, x.v, x.a, external, ground);
+    BOOST_TEST(same(everythingSeen(plane.dynacom), everythingSeen(flat.dynacom)));
+    BOOST_TEST(plane.dynacom.getDistributionStatus() == DistributionStatus::NoContact);
+    BOOST_TEST(close(flat.dynacom.getCoP3D().z(), height, 1e-15));
+    flat.dynacom.computeNL(3., x.q, x.v, x.a, external);
+    plane.dynacom.computeNL(3., x.q, x.v, x.a, external, ground);
+    BOOST_TEST(same(everythingSeen(plane.dynacom), everythingSeen(flat.dynacom)));
+    plane.dynacom.computeDynamics(knownMotion(plane.model, x), external, ground);
+    plane.dynacom.computeNL(3.);
+    checkSameMotion(plane.dynacom, flat.dynacom);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(on_a_slope_pressure_is_where_the_contacts_press) {
+  // By the force along the normal, each at its own centre of pressure: (6) is by vertical force.
+  int solved = 0, relaxed = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    OnSlope slope(seed);
+    DynaCoM& dynacom = slope.dynacom;
+    const State x = slope.rest();
+    const Vector6 external = slope.external();
+    dynacom.computeNL(3., x.q, x.v, x.a, external, slope.plane);
+    const Vector3d asked = dynacom.getCoP3D();
+    BOOST_TEST(close(dynacom.getCoP(), asked.head<2>(), 0.));
+    BOOST_TEST(close(dynacom.getNL(), asked.head<2>() - dynacom.getVRP(), 0.));
+    BOOST_TEST(close(dynacom.getVRP3D().head<2>(), dynacom.getVRP(), 0.));
+    const bool in_reach = distribute(dynacom) == DistributionStatus::Solved;
+    ++(in_reach ? solved : relaxed);
+
+    const Vector3d normal = slope.plane.normal.normalized();
+    Vector3d sum = Vector3d::Zero();
+    double total = 0.;
+    for (const auto& contact : slope.contacts) {
+      const double pressure = contact->appliedForce().z();
+      if (pressure < 1e-6) continue;
+      Vector3d at;
+      at << contact->getCoP(), 0.;
+      sum += pressure * contact->getSurfacePose().act(at);
+      total += pressure;
+    }
+    const Vector3d given = dynacom.getZMP(slope.plane);
+    BOOST_TEST(close(given, sum / total, 1e-7));
+    BOOST_TEST(close(normal.dot(given - slope.plane.point), 0.));
+    if (in_reach) BOOST_TEST(close(given, asked, 1e-6));
+  }
+  BOOST_TEST(solved > 15);
+  BOOST_TEST(relaxed > 5);
+}
+
+BOOST_AUTO_TEST_CASE(zero_moment_point_of_contacts_that_stand_anywhere_is_on_any_plane) {
+  Random random(21);
+  int solved = 0, relaxed = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    std::vector<SE3> soles = stance(3);
+    for (SE3& sole : soles) {
+      sole.translation().z() = random.uniform(-1.1, -0.7);
+      sole.rotation() =
+          Eigen::AngleAxisd(random.uniform(-0.3, 0.3), random.rotation().col(0)).toRotationMatrix();
+    }
+    DynaCoM dynacom(singleBody(50., soles));
+    std::vector<std::shared_ptr<ContactBase>> contacts;
+    for (int i = 0; i < 3; ++i) {
+      const std::string frame = "sole" + std::to_string(i);
+      contacts.push_back(makeSole(frame));
+      dynacom.addContact(contacts.back(), frame);
+    }
+    State x = restState(dynacom.getModel());
+    x.q.head<3>() = random.vector3();
+    Vector6 wanted = random.vector(6, 60.);
+    wanted.z() = random.uniform(300., 600.);
+    const Vector6 external = externalFor(dynacom, x, wanted);
+    compute(dynacom, x, external, false);
+    ++(dynacom.getDistributionStatus() == DistributionStatus::Solved ? solved : relaxed);
+    const GroundPlane plane{random.vector3(), Vector3d::UnitZ() + random.vector3(0.5)};
+    const Vector3d expected = zeroMomentPoint(contacts, plane);
+    BOOST_TEST(close(dynacom.getZMP(plane), expected, 1e-9));
+    // It is of the distribution: what is computed or activated later does not change it, nor which
+    // point its moments are about.
+    dynacom.computeDynamics(x.q, x.v, Vector6(x.a + random.vector(6)), external, plane);
+    dynacom.deactivateContact("sole1");
+    BOOST_TEST(close(dynacom.getZMP(plane), expected, 1e-9));
+    dynacom.activateContact("sole1");
+    const Vector3d other = dynacom.getCoM() + random.vector3();
+    distribute(dynacom, wanted, other);
+    BOOST_TEST(close(dynacom.getZMP(plane), zeroMomentPoint(contacts, plane), 1e-9));
+  }
+  BOOST_TEST(solved > 10);
+  BOOST_TEST(relaxed > 5);
+}
+
+BOOST_AUTO_TEST_CASE(without_forces_of_contacts_there_is_no_zero_moment_point) {
+  Biped biped(22);
+  DynaCoM& dynacom = biped.dynacom;
+  BOOST_TEST(allNaN(dynacom.getZMP(GroundPlane())));
+  compute(dynacom, restState(biped.model));
+  BOOST_TEST(allNaN(dynacom.getZMP(GroundPlane())));
+  distribute(dynacom);
+  BOOST_TEST(close(dynacom.getZMP(GroundPlane()), dynacom.getCoP3D(), 1e-8));
+  // Nor on the other side of the ground.
+  BOOST_TEST(allNaN(dynacom.getZMP({Vector3d::Zero(), -Vector3d::UnitZ()})));
+  dynacom.setMinimalVerticalForce(1.001 * dynacom.getGroundCoMForce().z());
+  BOOST_TEST(allNaN(dynacom.getZMP(GroundPlane())));
+  BOOST_TEST(allNaN(dynacom.getCMP(GroundPlane())));
+  dynacom.setMinimalVerticalForce(1.);
+  dynacom.deactivateContact("left");
+  dynacom.deactivateContact("right");
+  distribute(dynacom);
+  BOOST_TEST(allNaN(dynacom.getZMP(GroundPlane())));
+}
+
+BOOST_AUTO_TEST_CASE(pivots_are_on_the_line_of_the_force_that_presses) {
+  int relaxed = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    OnSlope slope(seed);
+    DynaCoM& dynacom = slope.dynacom;
+    const State x = slope.rest();
+    const Vector6 external = slope.external();
+    const auto check = [&](const Vector3d& force) {
+      const Vector3d c = dynacom.getCoM(), pivot = dynacom.getCMP(slope.plane);
+      BOOST_TEST(close(slope.plane.normal.dot(pivot - slope.plane.point), 0.));
+      BOOST_TEST(close((c - pivot).cross(force), Vector3d::Zero(), 1e-9));
+      // The eCMP has what else acts on the robot, too.
+      const Vector3d all = force + external.head<3>();
+      const double stiffness = dynacom.getMass() * 3. * 3.;
+      BOOST_TEST(close(stiffness * (c - dynacom.getECMP()), all, 1e-9));
+      BOOST_TEST(close(dynacom.getVRP3D() - dynacom.getECMP(), Vector3d(0., 0., 9.81 / 9.), 1e-9));
+      BOOST_TEST(close(dynacom.getVRP(), dynacom.getVRP3D().head<2>(), 0.));
+    };
+    dynacom.computeNL(3., x.q, x.v, x.a, external, slope.plane);
+    check(dynacom.getGroundCoMForce());
+    // On uneven ground it is what the contacts achieve.
+    dynacom.computeNL(3., x.q, x.v, x.a, external, false);
+    check(dynacom.getDistribution().achieved.head<3>());
+    if (dynacom.getDistributionStatus() == DistributionStatus::Relaxed) ++relaxed;
+  }
+  BOOST_TEST(relaxed > 5);
+}
+
+BOOST_AUTO_TEST_CASE(on_the_ground_the_enhanced_pivot_is_the_pivot) {
+  // With the ω that puts it there, where nothing else acts on the robot.
+  Biped biped(23);
+  DynaCoM& dynacom = biped.dynacom;
+  for (int trial = 0; trial < 10; ++trial) {
+    const State x = biped.moving();
+    compute(dynacom, x);
+    const double height = dynacom.getCoM().z();
+    dynacom.computeNL(std::sqrt(dynacom.getGroundCoMForce().z() / (dynacom.getMass() * height)));
+    BOOST_TEST(close(dynacom.getECMP(), dynacom.getCMP(GroundPlane()), 1e-11));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(on_uneven_ground_pressure_has_a_height) {
+  // Two points at different heights, and the weight in the middle between them.
+  std::vector<SE3> soles = stance(2);
+  soles[0].translation().z() = -0.8;
+  soles[1].translation().z() = -1.;
+  const auto model = singleBody(50., soles);
+  DynaCoM dynacom(model);
+  dynacom.addContact(makePoint("sole0"), "left");
+  dynacom.addContact(makePoint("sole1"), "right");
+  const State x = restState(model);
+  compute(dynacom, x, Vector6::Zero(), false);
+  BOOST_TEST(dynacom.getDistributionStatus() == DistributionStatus::Solved);
+  BOOST_TEST(close(dynacom.getCoP3D(), Vector3d(0., 0., -0.9), 1e-8));
+}
+
+BOOST_AUTO_TEST_CASE(a_robot_may_press_on_a_wall) {
+  // Pulled to the wall behind it by ten times its weight.
+  const auto model = singleBody(50., {});
+  DynaCoM dynacom(model);
+  const double weight = 50. * 9.81;
+  Vector6 external = Vector6::Zero();
+  external.x() = -10. * weight;
+  State x = restState(model);
+  x.q.head<3>() << 0.5, 0.2, 2.;
+  const GroundPlane wall{Vector3d(-0.5, 0., 0.), Vector3d::UnitX()};
+  dynacom.computeDynamics(x.q, x.v, x.a, external, wall);
+  BOOST_TEST(close(dynacom.getCoP3D(), Vector3d(-0.5, 0.2, 1.9)));
+  BOOST_TEST(close(dynacom.getCMP(wall), dynacom.getCoP3D()));
+}
+
+BOOST_AUTO_TEST_CASE(motions_that_are_not_finite_press_nowhere_on_a_plane) {
+  Biped biped(24);
+  DynaCoM& dynacom = biped.dynacom;
+  const State x = restState(biped.model);
+  for (int i = 0; i < 3; ++i) {
+    dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), GroundPlane());
+    BOOST_TEST(dynacom.isCoPDefined());
+    State bad = x;
+    (i == 0 ? bad.q : i == 1 ? bad.v : bad.a)[2] = kNaN;
+    dynacom.computeDynamics(bad.q, bad.v, bad.a, Vector6::Zero(), GroundPlane());
+    BOOST_TEST(motionIsUnknown(dynacom));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(planes_that_are_none_are_refused_and_change_nothing) {
+  Biped biped(25);
+  DynaCoM& dynacom = biped.dynacom;
+  const State x = biped.moving(), y = biped.moving();
+  dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), false);
+  const View before = everythingSeen(dynacom);
+  const GroundPlane bad{Vector3d::Zero(), Vector3d::Zero()};
+  const auto data = knownMotion(biped.model, y);
+  const Vector6 none = Vector6::Zero();
+  const std::vector<std::function<void()>> calls = {
+      [&] { dynacom.computeDynamics(y.q, y.v, y.a, none, bad); },
+      [&] { dynacom.computeDynamics(data, none, bad); },
+      [&] { dynacom.computeNL(3., y.q, y.v, y.a, none, bad); }, [&] { dynacom.getCMP(bad); },
+      [&] { dynacom.getZMP(bad); }};
+  for (const auto& call : calls) {
+    BOOST_TEST(throws<std::invalid_argument>(call, {"GroundPlane.normal", "0 0 0"}));
+    BOOST_TEST(same(everythingSeen(dynacom), before));
+  }
+  BOOST_TEST(throws<std::invalid_argument>(
+      [&] { dynacom.computeNL(0., y.q, y.v, y.a, none, GroundPlane()); }, {"omega", "0"}));
+  BOOST_TEST(same(everythingSeen(dynacom), before));
+  BOOST_TEST(throws<NotReadyError>(
+      [&] { DynaCoM().computeDynamics(y.q, y.v, y.a, none, GroundPlane()); }, {"initialize"}));
 }
 
 BOOST_AUTO_TEST_CASE(minimal_vertical_force_must_be_positive) {

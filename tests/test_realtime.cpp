@@ -300,6 +300,9 @@ class ControlLoop {
       begin("computeNL");
       dynacom_.computeNL(3.);
       dynacom_.computeNL(3., x.q, x.v, x.a, external_, tick % 2 == 0);
+      begin("computeNL on a plane");
+      dynacom_.computeNL(3., x.q, x.v, x.a, external_,
+                         GroundPlane{Vector3d::Zero(), Vector3d(0.1, 0.2, 3.)});
       begin("distributeForce in reach");
       distribute(groundWrench());
       count();
@@ -417,6 +420,8 @@ class ControlLoop {
                  dynacom_.getACoM().x() + dynacom_.getAM().x() + dynacom_.getAMVariation().x() +
                  dynacom_.getGroundCoMForce().x() + dynacom_.getGroundCoMTorque().x() +
                  dynacom_.getCoP().x() + dynacom_.getVRP().x() + dynacom_.getNL().x() +
+                 dynacom_.getCoP3D().x() + dynacom_.getVRP3D().x() + dynacom_.getECMP().x() +
+                 dynacom_.getCMP(GroundPlane()).x() + dynacom_.getZMP(GroundPlane()).x() +
                  dynacom_.getFeasibleACoM().x() + dynacom_.getFeasibleAMVariation().x() +
                  dynacom_.ne_b()[0] + dynacom_.getDistribution().residual[0] +
                  dynacom_.getDistribution().isOptimal();

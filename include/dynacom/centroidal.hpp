@@ -81,6 +81,21 @@ DYNACOM_EXPORT Eigen::Vector2d computeFlatGroundCoP(
 /// @throws std::invalid_argument unless ω > 0
 DYNACOM_EXPORT Eigen::Vector2d computeVRP(const CentroidalState& state, double omega);
 
+/// The same in three dimensions: the total force on the robot, gravity's included, is m ω² (c − v).
+/// A pendulum whose v is to stay Δz above its eCMP has ω = √(|g|/Δz).
+/// @throws std::invalid_argument unless ω > 0
+DYNACOM_EXPORT Eigen::Vector3d computeVRP3D(const CentroidalState& state, double omega);
+
+/// Enhanced centroidal moment pivot, equation (23): e = c − (c̈ − g) / ω² [m], so that the force on
+/// the robot besides gravity's, the ground's where nothing else acts, is m ω² (c − e). It lies on
+/// that force's line through c, and v = e − g/ω² above it. NaN where that is beyond the largest
+/// numbers.
+/// @param gravity  g, world [m/s²]
+/// @param omega    ω > 0, natural frequency of the linear inverted pendulum [rad/s]
+/// @throws std::invalid_argument unless ω > 0
+DYNACOM_EXPORT Eigen::Vector3d computeECMP(const CentroidalState& state,
+                                           const Eigen::Vector3d& gravity, double omega);
+
 /// Divergent component of motion on the ground's plane, equation (20): ξ = c + ċ / ω [m]; NaN where
 /// that is beyond the largest numbers.
 /// @param omega  ω > 0, natural frequency of the linear inverted pendulum [rad/s]

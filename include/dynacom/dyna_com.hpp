@@ -10,6 +10,7 @@
 
 #include "dynacom/centroidal.hpp"
 #include "dynacom/contact_base.hpp"
+#include "dynacom/ground_plane.hpp"
 #include "dynacom/wrench_distribution.hpp"
 
 namespace dynacom {
@@ -87,7 +88,8 @@ class DYNACOM_EXPORT DynaCoM {
   void setGroundHeight(double groundHeight);
 
   /// Below this vertical force a centre of pressure means nothing, kMinimalVerticalForce by default
-  /// [N]: getCoP() is NaN then, and for a contact, below this normal force, getContactCoP().
+  /// [N]: getCoP() is NaN then; and below this normal force, a contact's getContactCoP(), and what
+  /// is to be found on a GroundPlane.
   double getMinimalVerticalForce() const { return minimal_vertical_force_; }
   /// @throws std::invalid_argument unless minimalVerticalForce is finite and > 0
   void setMinimalVerticalForce(double minimalVerticalForce);
@@ -136,7 +138,15 @@ class DYNACOM_EXPORT DynaCoM {
                        const Vector6& extWrench = Vector6::Zero(),
                        bool flatHorizontalGround = true);
 
-  /// The same for a motion of which all that Pinocchio computes is known:
+  /// The same on any plane, a slope or a wall: the centre of pressure is that of the ground wrench
+  /// by equation (21), so that it is where lateral forces put it, too. Nothing is distributed, as
+  /// on flat horizontal ground, which is the plane with getGroundHeight() and the normal z.
+  /// @throws std::invalid_argument if the plane is not valid, else as above; nothing has changed
+  ///         then
+  void computeDynamics(const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                       const Vector6& extWrench, const GroundPlane& ground);
+
+  /// The first for a motion of which all that Pinocchio computes is known:
   /// computeCentroidalMomentumTimeVariation(getModel(), data, q, v, a) has run on data, and nothing
   /// since that changes its com, vcom, hg, dhg, mass or oMi. Those are read, and oMi is copied to
   /// getData(), so that contacts can be placed later; nothing else in getData() is that of the
@@ -146,6 +156,9 @@ class DYNACOM_EXPORT DynaCoM {
   ///         initialize()
   void computeDynamics(const pinocchio::Data& data, const Vector6& extWrench = Vector6::Zero(),
                        bool flatHorizontalGround = true);
+  /// And on any plane.
+  void computeDynamics(const pinocchio::Data& data, const Vector6& extWrench,
+                       const GroundPlane& ground);
 
   /// Of the last computeDynamics(): the wrench that the ground must give, about the CoM.
   const Eigen::Vector3d& getGroundCoMForce() const { return ground_wrench_.force; }    ///< [N]
@@ -157,11 +170,21 @@ class DYNACOM_EXPORT DynaCoM {
   /// Of the last computeDynamics(): angular momentum about the CoM, and its rate.
   const Eigen::Vector3d& getAM() const { return state_.am; }                    ///< [kg·m²/s]
   const Eigen::Vector3d& getAMVariation() const { return state_.amVariation; }  ///< [N·m]
-  /// Of the last computeDynamics(): centre of pressure [m]; NaN unless isCoPDefined().
+  /// Of the last computeDynamics(): x and y of the centre of pressure [m]; NaN unless
+  /// isCoPDefined().
   const Eigen::Vector2d& getCoP() const { return cop_; }
-  /// Whether there is a centre of pressure: the vertical force is getMinimalVerticalForce() or
-  /// more.
+  /// The whole of it: on the ground's plane, or, on uneven ground, the mean of the contacts' p_k.
+  const Eigen::Vector3d& getCoP3D() const { return cop_3d_; }
+  /// Whether there is a centre of pressure: the vertical force, on a GroundPlane that along its
+  /// normal, is getMinimalVerticalForce() or more.
   bool isCoPDefined() const { return cop_.allFinite(); }
+
+  /// Centroidal moment pivot of the last computeDynamics() on a plane, equation (22): where the
+  /// line along the ground's force through the CoM meets it. The force is the one of which
+  /// getCoP() is: getGroundCoMForce(), or, on uneven ground, what the contacts achieve of it.
+  /// @return world [m]; NaN where the force along the normal is below getMinimalVerticalForce()
+  /// @throws std::invalid_argument if the plane is not valid
+  Eigen::Vector3d getCMP(const GroundPlane& plane) const;
 
   /// The accelerations that the contacts can really cause, by the wrench (f, τ) that the last
   /// distribution since computeDynamics() has achieved and that call's extWrench (f_e, τ_e),
@@ -184,9 +207,16 @@ class DYNACOM_EXPORT DynaCoM {
   /// computeDynamics() and computeNL(omega).
   void computeNL(double omega, const VectorRef& q, const VectorRef& v, const VectorRef& a,
                  const Vector6& extWrench = Vector6::Zero(), bool flatHorizontalGround = true);
+  /// And on any plane.
+  void computeNL(double omega, const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                 const Vector6& extWrench, const GroundPlane& ground);
 
   const Eigen::Vector2d& getVRP() const { return vrp_; }  ///< Of the last computeNL() [m].
   const Eigen::Vector2d& getNL() const { return nl_; }    ///< The same; NaN where the CoP is [m].
+  /// Of the last computeNL(): virtual repellent point, whose x and y getVRP() has, and enhanced
+  /// centroidal moment pivot, equation (23), of the same c̈ [m].
+  const Eigen::Vector3d& getVRP3D() const { return vrp_3d_; }
+  const Eigen::Vector3d& getECMP() const { return ecmp_; }
 
   /// Makes a contact known under a name, and active unless said otherwise. It is shared, not
   /// copied: settings that change in the caller's hand act on the next call. A contact serves one
@@ -256,6 +286,13 @@ class DYNACOM_EXPORT DynaCoM {
   /// times as long as a distribution.
   WrenchMargin computeWrenchMargin() { return distribution_.computeMargin(); }
 
+  /// Zero-moment point of the last distribution on a plane: equation (21) of the wrench that its
+  /// contacts achieve, wherever they stand. On a plane on which all of them stand it is their
+  /// centre of pressure.
+  /// @return world [m]; NaN where the force along the normal is below getMinimalVerticalForce()
+  /// @throws std::invalid_argument if the plane is not valid
+  Eigen::Vector3d getZMP(const GroundPlane& plane) const;
+
   /// Of the last distribution, for a contact: its centre of pressure, in its surface's plane [m];
   /// NaN where its normal force is below getMinimalVerticalForce().
   /// @throws std::invalid_argument if the name is not known, as the next three
@@ -306,12 +343,18 @@ class DYNACOM_EXPORT DynaCoM {
   std::vector<Entry>::iterator firstInactive();
   void updateFrames();
   void place(const Entry& entry, const Eigen::Vector3d& com);
-  void takeMotion(const CentroidalState& state, bool finite, const Vector6& extWrench,
-                  bool flatHorizontalGround);
+  void readMotion(const VectorRef& q, const VectorRef& v, const VectorRef& a,
+                  const Vector6& extWrench);
+  void readMotion(const pinocchio::Data& data, const Vector6& extWrench);
+  void takeMotion(const CentroidalState& state, bool finite, const Vector6& extWrench);
+  void press(bool flatHorizontalGround);
+  void pressOn(const GroundPlane& ground);
+  void pressByContacts();
   std::size_t findFreeSlot() const;
   bool isLoaded(const ContactBase& contact) const;
   double getUsage(const std::string& name, double (ContactBase::*usage)() const) const;
-  Eigen::Vector2d computePressureCentre() const;
+  void setCoP(const Eigen::Vector3d& cop);
+  Eigen::Vector3d computePressureCentre() const;
   template <class Rows, class Block>
   Eigen::MatrixXd stackDiagonally(Rows rows, Block block) const;
   template <class Block>
@@ -330,9 +373,11 @@ class DYNACOM_EXPORT DynaCoM {
   CentroidalState feasible_;  // the state with the accelerations that contacts can cause
   CentroidalState pressing_;  // state_ or feasible_: the motion whose CoP and VRP are reported
   Eigen::Vector2d cop_, vrp_, nl_;
+  Eigen::Vector3d cop_3d_, vrp_3d_, ecmp_;
 
   std::vector<Entry> contacts_;  // the active ones first
   WrenchDistribution distribution_;
+  Eigen::Vector3d distribution_com_;  // which the last distribution's moments are about
 };
 
 }  // namespace dynacom

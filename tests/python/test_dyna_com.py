@@ -132,6 +132,9 @@ MOTION_GETTERS = (
     "getCoP",
     "getVRP",
     "getNL",
+    "getCoP3D",
+    "getVRP3D",
+    "getECMP",
     "getFeasibleACoM",
     "getFeasibleAMVariation",
 )
@@ -2481,6 +2484,7 @@ def test_methods_and_properties_have_docstrings(cls, name):
 
 HEADERS = {
     "centroidal.hpp": (),
+    "ground_plane.hpp": (None, "GroundPlane"),
     "contact_base.hpp": ("ContactBase",),
     "contact_point.hpp": ("ContactPointSettings", "ContactPoint"),
     "contact6d.hpp": ("Contact6DSettings", "Contact6D"),

@@ -59,6 +59,7 @@ def objects(talos, talos_standing, talos_motion):
     objects = [
         state,
         dynacom.computeGroundWrench(state, [0.0, 0.0, -9.81]),
+        dynacom.GroundPlane(),
         point_settings(),
         sole_settings(),
         point(),
