@@ -319,7 +319,9 @@ class MotionExaminer::Workspace::Pipeline {
     std::vector<double> cutoffs;
     if (settings_.sensitivity && derived.cutoff > 0.)
       for (const double cutoff : {0.5 * derived.cutoff, 2. * derived.cutoff})
-        if (cutoff < kMaximalCutoff * derived.frame_rate) cutoffs.push_back(cutoff);
+        if (cutoff >= kMinimalCutoff * derived.frame_rate &&
+            cutoff < kMaximalCutoff * derived.frame_rate)
+          cutoffs.push_back(cutoff);
     return cutoffs;
   }
 

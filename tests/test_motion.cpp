@@ -336,6 +336,9 @@ BOOST_AUTO_TEST_CASE(a_filter_out_of_range_is_refused) {
   refused(50., 0., {"cutoff", "0"});
   refused(50., -1., {"cutoff", "-1"});
   refused(50., nan, {"cutoff", "nan"});
+  refused(100., 1e-17, {"cutoff", "1e-07", "1e-09", "1e-17"});
+  refused(1e308, 1., {"cutoff", "1e+299", "1"});
+  BOOST_TEST(filterConfigurations(model, q, 100., 1.001e-7).allFinite());
   refused(0., 1., {"rate", "0"});
   refused(nan, 1., {"rate", "nan"});
   MatrixXd bad = q;
