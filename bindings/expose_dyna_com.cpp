@@ -129,7 +129,7 @@ void exposeDynaCoM() {
            "contacts and the centre of pressure: by (5) on flat horizontal ground, else by (6),\n"
            "after distributing the wrench. All results are NaN if a number is not finite, or "
            "becomes\n"
-           "so.\n\n"
+           "so, or a quaternion's norm is not 1.\n\n"
            "q: (nq,); v: (nv,); a: (nv,); extWrench: (6,), force [N] and moment [N·m] about the\n"
            "centre of mass. Raises ValueError if one has another size.")
       .def(

@@ -75,7 +75,9 @@ void exposeMotionAnalysis() {
       "the work, 0 for as many as the machine has, with the same results bit for bit; lanes: how\n"
       "many frames a thread computes at once, at most, see countLanes. Raises ValueError if "
       "motion\n"
-      "or schedule is not valid, or names a contact that the robot does not know.");
+      "or schedule is not valid, or names a contact that the robot does not know; but a frame "
+      "with\n"
+      "a quaternion whose norm is not 1 is NaN, and its status InvalidInput.");
   bp::def(
       "countLanes", &countLanes, (bp::arg("robot"), bp::arg("lanes") = kMaximalLanes),
       "How many lanes of SIMD registers this machine has for a robot, and no more than so many:\n"

@@ -9,6 +9,7 @@
 
 #include "check.hpp"
 #include "contact_frame.hpp"
+#include "motion_check.hpp"
 #include "nan.hpp"
 #include "standard_gravity.hpp"
 #include "urdf.hpp"
@@ -28,6 +29,10 @@ constexpr double kSameMass = 1e-9;
 CentroidalState unknownState(double mass) {
   const Eigen::Vector3d nan = Eigen::Vector3d::Constant(kNaN);
   return {mass, nan, nan, nan, nan, nan};
+}
+
+pinocchio::SE3 unknownPlacement() {
+  return {Eigen::Matrix3d::Constant(kNaN), Eigen::Vector3d::Constant(kNaN)};
 }
 
 bool isFinite(const CentroidalState& state) {
@@ -89,11 +94,13 @@ void DynaCoM::setModel(pinocchio::Model&& model, DynaCoMSettings&& settings) {
   if (!(mass > 0.)) throwInvalid("the robot '", model.name, "' must have a mass > 0, got ", mass);
   if (std::isinf(mass)) throwInvalid("the robot '", model.name, "' must have a finite mass");
   pinocchio::Data data(model);
+  auto configuration_check = std::make_shared<const internal::ConfigurationCheck>(model);
   for (Entry& entry : contacts_) entry.contact->deactivate();
   contacts_.clear();
   settings_ = std::move(settings);
   model_ = std::move(model);
   data_ = std::move(data);
+  configuration_check_ = std::move(configuration_check);
   mass_ = mass;
   forgetMotion();
 }
@@ -132,7 +139,11 @@ void DynaCoM::computeDynamics(const VectorRef& q, const VectorRef& v, const Vect
   updateFrames();
   const CentroidalState state = computeCentroidalState(model_, data_, q, v, a);
   const bool finite = areFinite(q) && areFinite(v) && areFinite(a);
-  takeMotion(state, finite, extWrench, flatHorizontalGround);
+  const bool normalized = configuration_check_->isNormalized(model_, q);
+  // Numbers that are not finite make all placements so that hang on them; wrong norms do not.
+  if (finite && !normalized)
+    for (pinocchio::SE3& oMi : data_.oMi) oMi = unknownPlacement();
+  takeMotion(state, finite && normalized, extWrench, flatHorizontalGround);
 }
 
 void DynaCoM::computeDynamics(const pinocchio::Data& data, const Vector6& extWrench,

@@ -2607,6 +2607,34 @@ BOOST_AUTO_TEST_CASE(a_move_keeps_the_contacts) {
   BOOST_TEST(moved.getContact("left") == biped.left);
 }
 
+BOOST_AUTO_TEST_CASE(a_quaternion_that_is_none_is_a_motion_of_which_nothing_is_known) {
+  Biped biped(70);
+  DynaCoM& dynacom = biped.dynacom;
+  const State good = biped.moving();
+  compute(dynacom, good, Vector6::Zero(), false);
+  const VectorXd forces = dynacom.allForces();
+  for (const double factor : {0., 0.99, 1.01, -2.}) {
+    for (const bool flat : {true, false}) {
+      State x = good;
+      x.q.segment<4>(3) *= factor;
+      compute(dynacom, x, Vector6::Zero(), flat);
+      BOOST_TEST(motionIsUnknown(dynacom));
+      // Nor is it known where contacts are: what is asked of them next is not answered either.
+      BOOST_TEST(distribute(dynacom, Vector6::Constant(1.), Vector3d::Zero()) ==
+                 DistributionStatus::InvalidInput);
+      BOOST_TEST(close(dynacom.allForces(), forces, 1e-9));
+      dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), flat);
+      BOOST_TEST(motionIsUnknown(dynacom));
+      compute(dynacom, good, Vector6::Zero(), flat);
+      BOOST_TEST(dynacom.isCoPDefined());
+    }
+  }
+  State x = good;
+  x.q.segment<4>(3) *= 1.0005;  // files are often rounded
+  compute(dynacom, x);
+  BOOST_TEST(dynacom.isCoPDefined());
+}
+
 BOOST_AUTO_TEST_CASE(what_was_moved_from_can_be_used_again) {
   Biped biped(65);
   const DynaCoM moved = std::move(biped.dynacom);

@@ -14,6 +14,10 @@
 
 namespace dynacom {
 
+namespace internal {
+class ConfigurationCheck;
+}
+
 /// What describes a DynaCoM.
 struct DYNACOM_EXPORT DynaCoMSettings {
   /// The robot: path of a URDF file, or the XML itself. Its root joint will be a free-flyer: its
@@ -124,9 +128,10 @@ class DYNACOM_EXPORT DynaCoM {
   /// with p_k the centre of pressure of contact k and f_k its force. Contacts without load drop
   /// out.
   ///
-  /// If a number is not finite, or becomes so, all results of the motion are NaN; a distribution on
-  /// uneven ground ends as DistributionStatus::InvalidInput. On flat ground there is none: forces
-  /// and getDistribution() stay those of the last one.
+  /// If a number is not finite, or becomes so, or a quaternion's norm is not 1 (up to 1e-3), all
+  /// results of the motion are NaN; a distribution on uneven ground ends as
+  /// DistributionStatus::InvalidInput. On flat ground there is none: forces and getDistribution()
+  /// stay those of the last one.
   /// @param q          configuration, model().nq, its quaternions of norm 1
   /// @param v, a       velocity and acceleration, model().nv
   /// @param extWrench  (force [N], moment [N·m]) on the robot besides the contacts', about the CoM
@@ -320,6 +325,7 @@ class DYNACOM_EXPORT DynaCoM {
   DynaCoMSettings settings_;
   pinocchio::Model model_;
   pinocchio::Data data_;
+  std::shared_ptr<const internal::ConfigurationCheck> configuration_check_;  // of the robot
   double mass_ = 0.;
   double ground_height_ = 0.;
   double minimal_vertical_force_ = kMinimalVerticalForce;
