@@ -365,7 +365,8 @@ DerivativeMismatch compareDerivatives(const pinocchio::Model& model, const Motio
       size += 0.5 * (from.squaredNorm() + to.squaredNorm());
     }
     double ratio(double steps, double least) const {
-      return std::sqrt(mismatch / steps) / std::max(std::sqrt(size / steps), least);
+      return internal::orInfinity(std::sqrt(mismatch / steps) /
+                                  std::max(std::sqrt(size / steps), least));
     }
   };
   const std::size_t count = begins.size() - 1;

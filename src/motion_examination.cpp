@@ -162,7 +162,8 @@ Mask findMissing(const ContactSplit& split, const SweptMotion& swept,
   const double weight = split.carrier.mass * internal::findUnitGravity(split.carrier.gravity);
   internal::SupportMeter support(split.carrier, swept.parts, swept.analysis);
   const auto isMissing = [&](Eigen::Index frame) {
-    const double force = inference.missing(0, frame), torque = inference.missing(1, frame);
+    const double force = internal::orInfinity(inference.missing(0, frame));
+    const double torque = internal::orInfinity(inference.missing(1, frame));
     const auto active = inference.schedule.active.col(frame);
     if (!active.any()) return std::max(force, torque) > settings.flight_with_support_needed.limit;
     if (force > settings.residual_force.limit || torque > settings.residual_torque.limit)
