@@ -15,10 +15,6 @@ bp::list toList(const std::vector<std::string>& names) {
 bp::list getActiveContacts(const DynaCoM& self) { return toList(self.getActiveContacts()); }
 bp::list getKnownContacts(const DynaCoM& self) { return toList(self.getKnownContacts()); }
 
-std::shared_ptr<ContactBase> getContact(const DynaCoM& self, const std::string& name) {
-  return self.getContact(name);
-}
-
 std::string write(const DynaCoM& robot) {
   if (!robot.isInitialized()) return "DynaCoM()";
   const pinocchio::Model& model = robot.getModel();
@@ -182,7 +178,9 @@ void exposeDynaCoM() {
           "addContact", &DynaCoM::addContact,
           (bp::arg("self"), bp::arg("contact"), bp::arg("name"), bp::arg("active") = true),
           "Makes a contact known under a name. It is shared, not copied. Raises ValueError if the\n"
-          "name is taken, the contact known or not initialised, or its frame not in the model.")
+          "name is taken, the contact known, here or to another DynaCoM, or not initialised, or "
+          "its\n"
+          "frame not in the model.")
       .def("removeContact", &DynaCoM::removeContact, (bp::arg("self"), bp::arg("name")),
            "Forgets a contact. Raises ValueError if the name is not known.")
       .def("activateContact", &DynaCoM::activateContact, (bp::arg("self"), bp::arg("name")),
@@ -210,7 +208,7 @@ void exposeDynaCoM() {
       .def("resetContactPose", &DynaCoM::resetContactPose, (bp::arg("self"), bp::arg("name")),
            "Places a contact by the model again, from the next computeDynamics() or\n"
            "distributeForce() on. Raises ValueError if the name is not known.")
-      .def("getContact", &getContact, (bp::arg("self"), bp::arg("name")),
+      .def("getContact", &DynaCoM::getContact, (bp::arg("self"), bp::arg("name")),
            "The contact of that name. Raises ValueError if it is not known.")
       .def("getActiveContacts", &getActiveContacts, bp::arg("self"),
            "Names of the active contacts, in the order of their activation.")

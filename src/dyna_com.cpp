@@ -59,17 +59,21 @@ std::ostream& operator<<(std::ostream& out, const DynaCoMSettings& settings) {
              << settings.gravity.transpose() << "])";
 }
 
-DynaCoM::Entry::Entry(std::string name, std::shared_ptr<ContactBase> contact, std::size_t slot)
-    : name(std::move(name)), contact(std::move(contact)), slot(slot) {}
+DynaCoM::OwnContact::OwnContact(std::shared_ptr<ContactBase> contact)
+    : contact_(std::move(contact)) {
+  contact_->taken_.value = true;
+}
 
-DynaCoM::Entry::Entry(const Entry& other)
-    : name(other.name),
-      contact(other.contact->clone()),
-      slot(other.slot),
-      active(other.active),
-      measured(other.measured) {}
+DynaCoM::OwnContact::OwnContact(const OwnContact& other) : OwnContact(other->clone()) {}
 
-DynaCoM::Entry& DynaCoM::Entry::operator=(const Entry& other) { return *this = Entry(other); }
+DynaCoM::OwnContact& DynaCoM::OwnContact::operator=(OwnContact other) noexcept {
+  contact_.swap(other.contact_);
+  return *this;
+}
+
+DynaCoM::OwnContact::~OwnContact() {
+  if (contact_) contact_->taken_.value = false;
+}
 
 DynaCoM::DynaCoM() { forgetMotion(); }
 DynaCoM::DynaCoM(const DynaCoMSettings& settings) { initialize(settings); }
@@ -213,16 +217,18 @@ void DynaCoM::addContact(const std::shared_ptr<ContactBase>& contact, const std:
   if (contact->cols() == 0) throwInvalid("contact '", name, "' was never initialised");
   for (const Entry& entry : contacts_) {
     if (entry.name == name) throwInvalid("there is a contact '", name, "' already");
-    if (entry.contact == contact)
+    if (entry.contact.get() == contact)
       throwInvalid("contact '", name, "' is known already, as '", entry.name, "'");
   }
+  if (contact->taken_.value)
+    throwInvalid("contact '", name, "' serves another DynaCoM: this one needs a copy of it");
   updateFrames();
   // Whatever index the contact holds may be another model's.
   const pinocchio::FrameIndex frame_id = findFrame(model_, contact->getFrameName(), name);
   const std::size_t slot = findFreeSlot();
   distribution_.clear();  // the slot may be that of a contact that was removed
   distribution_.reserve(*contact, slot);
-  contacts_.emplace_back(name, contact, slot);
+  contacts_.push_back({name, OwnContact(contact), slot});
   contact->setFrameID(frame_id);
   contact->deactivate();
   if (hasMotion()) place(contacts_.back(), state_.com);
@@ -316,8 +322,8 @@ void DynaCoM::setContactPose(const std::string& name, const pinocchio::SE3& oMs)
 
 void DynaCoM::resetContactPose(const std::string& name) { find(name)->measured = false; }
 
-const std::shared_ptr<ContactBase>& DynaCoM::getContact(const std::string& name) const {
-  return find(name)->contact;
+std::shared_ptr<ContactBase> DynaCoM::getContact(const std::string& name) const {
+  return find(name)->contact.get();
 }
 
 std::vector<std::string> DynaCoM::getActiveContacts() const {
@@ -362,12 +368,12 @@ bool DynaCoM::isLoaded(const ContactBase& contact) const {
 }
 
 Eigen::Vector2d DynaCoM::getContactCoP(const std::string& name) const {
-  const ContactBase& contact = *getContact(name);
+  const ContactBase& contact = *find(name)->contact;
   return isLoaded(contact) ? contact.getCoP() : Eigen::Vector2d::Constant(kNaN);
 }
 
 double DynaCoM::getUsage(const std::string& name, double (ContactBase::*usage)() const) const {
-  const ContactBase& contact = *getContact(name);
+  const ContactBase& contact = *find(name)->contact;
   const double value = (contact.*usage)();
   return std::isnan(value) || isLoaded(contact) ? value : 0.;
 }
@@ -377,7 +383,7 @@ double DynaCoM::getContactFrictionUsage(const std::string& name) const {
 }
 
 double DynaCoM::getContactCoPMargin(const std::string& name) const {
-  const ContactBase& contact = *getContact(name);
+  const ContactBase& contact = *find(name)->contact;
   return isLoaded(contact) ? contact.getCoPMargin() : kNaN;
 }
 

@@ -2607,6 +2607,74 @@ BOOST_AUTO_TEST_CASE(a_move_keeps_the_contacts) {
   BOOST_TEST(moved.getContact("left") == biped.left);
 }
 
+BOOST_AUTO_TEST_CASE(a_contact_stays_the_one_that_was_asked_for) {
+  Biped biped(67);
+  const auto& left = biped.dynacom.getContact("left");
+  const auto& right = biped.dynacom.getContact("right");
+  biped.dynacom.deactivateContact("left");
+  biped.dynacom.activateContact("left");
+  biped.dynacom.deactivateContact("right");
+  BOOST_TEST(left == biped.left);
+  BOOST_TEST(right == biped.right);
+  biped.dynacom.removeContact("left");
+  BOOST_TEST(left == biped.left);
+}
+
+BOOST_AUTO_TEST_CASE(a_contact_serves_one_robot_at_a_time) {
+  Biped biped(68);
+  DynaCoM other(biped.model);
+  const auto expectTaken = [&] {
+    BOOST_TEST(throws<std::invalid_argument>([&] { other.addContact(biped.left, "foot"); },
+                                             {"foot", "another DynaCoM"}));
+    BOOST_TEST(other.getKnownContacts().empty());
+  };
+  const auto expectFree = [&] {
+    BOOST_CHECK_NO_THROW(other.addContact(biped.left, "foot"));
+    other.removeContact("foot");
+  };
+  expectTaken();
+  // Where it is inactive, moves with its robot, is initialised again, or assigned to, too.
+  biped.dynacom.deactivateContact("left");
+  expectTaken();
+  DynaCoM moved = std::move(biped.dynacom);
+  expectTaken();
+  biped.left->initialize(biped.left->getSettings());
+  expectTaken();
+  const Contact6D copy = *biped.left;
+  *biped.left = *makeSole("sole0");
+  expectTaken();
+  // Copies of it are free, and those that copies of its robot have are not.
+  BOOST_CHECK_NO_THROW(other.addContact(std::make_shared<Contact6D>(copy), "foot"));
+  DynaCoM copied = moved, assigned;
+  assigned = copied;
+  for (const DynaCoM* robot : {&copied, &assigned})
+    BOOST_TEST(throws<std::invalid_argument>(
+        [&] { other.addContact(robot->getContact("left"), "hand"); }, {"another"}));
+  const auto old = assigned.getContact("left");
+  assigned = moved;
+  BOOST_CHECK_NO_THROW(other.addContact(old, "hand"));
+  other.initialize(biped.model);
+  // It is free when its robot has removed it, knows another robot, or is gone.
+  moved.removeContact("left");
+  expectFree();
+  moved.addContact(biped.left, "left");
+  expectTaken();
+  moved.initialize(biped.model);
+  expectFree();
+  {
+    DynaCoM short_lived(biped.model);
+    short_lived.addContact(biped.left, "left");
+    expectTaken();
+  }
+  expectFree();
+  // A contact that was refused is no less free.
+  BOOST_CHECK_THROW(other.addContact(makeSole("no frame"), "foot"), std::invalid_argument);
+  auto lost = makeSole("no frame");
+  BOOST_CHECK_THROW(other.addContact(lost, "foot"), std::invalid_argument);
+  lost->initialize(biped.left->getSettings());
+  BOOST_CHECK_NO_THROW(other.addContact(lost, "foot"));
+}
+
 BOOST_AUTO_TEST_CASE(a_quaternion_that_is_none_is_a_motion_of_which_nothing_is_known) {
   Biped biped(70);
   DynaCoM& dynacom = biped.dynacom;

@@ -195,9 +195,11 @@ class DYNACOM_EXPORT DynaCoM {
 
   /// Makes a contact known under a name, and active unless said otherwise. It is shared, not
   /// copied: settings that change in the caller's hand act on the next call. A contact serves one
-  /// DynaCoM at a time, which sets its frame index, its pose and its force.
+  /// DynaCoM at a time, which sets its frame index, its pose and its force; it is free again once
+  /// it was removed, or that DynaCoM was initialised again or is gone.
   /// @throws std::invalid_argument if the contact is null, was never initialised or is known
-  ///         already, the name is taken, or the model does not have one frame of the contact's name
+  ///         already, here or to another DynaCoM, the name is taken, or the model does not have one
+  ///         frame of the contact's name
   void addContact(const std::shared_ptr<ContactBase>& contact, const std::string& name,
                   bool active = true);
   /// Forgets a contact; its force becomes zero.
@@ -227,7 +229,7 @@ class DYNACOM_EXPORT DynaCoM {
   void resetContactPose(const std::string& name);
 
   /// @throws std::invalid_argument if the name is not known
-  const std::shared_ptr<ContactBase>& getContact(const std::string& name) const;
+  std::shared_ptr<ContactBase> getContact(const std::string& name) const;
   /// Names of the active contacts, in the order of their activation.
   std::vector<std::string> getActiveContacts() const;
   /// Names of all contacts: the active ones as above, then the others.
@@ -287,16 +289,27 @@ class DYNACOM_EXPORT DynaCoM {
   Eigen::VectorXd allForces() const;
 
  private:
-  // A copy has a contact of its own; a move keeps it.
-  struct Entry {
-    Entry(std::string name, std::shared_ptr<ContactBase> contact, std::size_t slot);
-    Entry(const Entry& other);
-    Entry(Entry&&) noexcept = default;
-    Entry& operator=(const Entry& other);
-    Entry& operator=(Entry&&) noexcept = default;
+  // A contact that is this robot's, as long as this lives. A copy has a contact of its own; a move
+  // keeps it.
+  class OwnContact {
+   public:
+    explicit OwnContact(std::shared_ptr<ContactBase> contact);
+    OwnContact(const OwnContact& other);
+    OwnContact(OwnContact&&) noexcept = default;
+    OwnContact& operator=(OwnContact other) noexcept;
+    ~OwnContact();
 
+    const std::shared_ptr<ContactBase>& get() const { return contact_; }
+    ContactBase& operator*() const { return *contact_; }
+    ContactBase* operator->() const { return contact_.get(); }
+
+   private:
+    std::shared_ptr<ContactBase> contact_;
+  };
+
+  struct Entry {
     std::string name;
-    std::shared_ptr<ContactBase> contact;
+    OwnContact contact;
     std::size_t slot;  // of the distribution
     bool active = false;
     bool measured = false;  // placed by setContactPose()
