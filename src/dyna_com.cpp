@@ -364,7 +364,8 @@ DistributionStatus DynaCoM::distributeForce(const Eigen::Vector3d& groundCoMForc
 }
 
 bool DynaCoM::isLoaded(const ContactBase& contact) const {
-  return contact.appliedForce()[2] >= minimal_vertical_force_;
+  // What was assigned to a contact may never have been initialised, and has no force.
+  return contact.cols() > 0 && contact.appliedForce()[2] >= minimal_vertical_force_;
 }
 
 Eigen::Vector2d DynaCoM::getContactCoP(const std::string& name) const {

@@ -2675,6 +2675,21 @@ BOOST_AUTO_TEST_CASE(a_contact_serves_one_robot_at_a_time) {
   BOOST_CHECK_NO_THROW(other.addContact(lost, "foot"));
 }
 
+BOOST_AUTO_TEST_CASE(what_was_never_initialised_has_no_force_to_ask_for) {
+  Biped biped(69);
+  compute(biped.dynacom, restState(biped.model));
+  distribute(biped.dynacom);
+  *biped.left = Contact6D();
+  BOOST_TEST(allNaN(biped.dynacom.getContactCoP("left")));
+  BOOST_TEST(std::isnan(biped.dynacom.getContactCoPMargin("left")));
+  BOOST_TEST(std::isnan(biped.dynacom.getContactFrictionUsage("left")));
+  BOOST_TEST(std::isnan(biped.dynacom.getContactYawUsage("left")));
+  BOOST_TEST(biped.dynacom.allForces().size() == 6);
+  BOOST_TEST(throws<std::invalid_argument>([&] { distribute(biped.dynacom); }, {"left", "frame"}));
+  *biped.left = *makeSole("sole0");
+  BOOST_TEST(distribute(biped.dynacom) == DistributionStatus::Solved);
+}
+
 BOOST_AUTO_TEST_CASE(a_quaternion_that_is_none_is_a_motion_of_which_nothing_is_known) {
   Biped biped(70);
   DynaCoM& dynacom = biped.dynacom;
