@@ -2607,6 +2607,33 @@ BOOST_AUTO_TEST_CASE(a_move_keeps_the_contacts) {
   BOOST_TEST(moved.getContact("left") == biped.left);
 }
 
+BOOST_AUTO_TEST_CASE(what_was_moved_from_waits_for_a_robot) {
+  Biped biped(66);
+  biped.dynacom.setWarmStart(false);
+  compute(biped.dynacom, biped.moving(), Vector6::Zero(), false);
+  const State x = biped.moving();
+  DynaCoM moved = std::move(biped.dynacom), assigned;
+  DynaCoM& husk = biped.dynacom;
+  for (const bool again : {false, true}) {
+    if (again) assigned = std::move(moved);
+    for (DynaCoM* dynacom : again ? std::vector{&husk, &moved} : std::vector{&husk}) {
+      BOOST_TEST(!dynacom->isInitialized());
+      BOOST_TEST(dynacom->getMass() == 0.);
+      BOOST_TEST(dynacom->getKnownContacts().empty());
+      BOOST_TEST(dynacom->allForces().size() == 0);
+      BOOST_TEST(dynacom->getDistributionStatus() == DistributionStatus::NoContact);
+      BOOST_TEST(dynacom->getWarmStart());
+      BOOST_TEST(throws<NotReadyError>([&] { compute(*dynacom, x); }, {"initialize"}));
+      BOOST_TEST(throws<NotReadyError>([&] { distribute(*dynacom); }, {"initialize"}));
+      BOOST_TEST(throws<NotReadyError>([&] { dynacom->addContact(makeSole("sole0"), "sole"); },
+                                       {"initialize"}));
+    }
+  }
+  BOOST_TEST(assigned.isInitialized());
+  BOOST_TEST(!assigned.getWarmStart());
+  BOOST_TEST(assigned.getContact("left") == biped.left);
+}
+
 BOOST_AUTO_TEST_CASE(a_contact_stays_the_one_that_was_asked_for) {
   Biped biped(67);
   const auto& left = biped.dynacom.getContact("left");

@@ -40,7 +40,9 @@ DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const DynaCoMSettings
 ///
 /// A DynaCoM owns a model, its data and an ordered list of contacts: the active ones, in the order
 /// of their activation, then the others. Matrices and forces are stacked in that order. Copying a
-/// DynaCoM copies its contacts too, so that a copy can work in another thread.
+/// DynaCoM copies its contacts too, so that a copy can work in another thread. One that was moved
+/// from has no robot and no contacts, and waits for initialize() as a new one does; what it still
+/// says of a motion means nothing.
 ///
 /// Vectors have the sizes of Pinocchio: q has getModel().nq components, v and a have getModel().nv.
 /// Everything is in the world's axes unless another frame is named. Before computeDynamics() all
@@ -75,15 +77,15 @@ class DYNACOM_EXPORT DynaCoM {
   void initialize(const pinocchio::Model& model);
 
   /// Whether there is a robot: false before initialize().
-  bool isInitialized() const { return mass_ > 0.; }
+  bool isInitialized() const { return configuration_check_ != nullptr; }
 
   const DynaCoMSettings& getSettings() const { return settings_; }
   const pinocchio::Model& getModel() const { return model_; }
   const pinocchio::Data& getData() const { return data_; }
   /// One may run Pinocchio's algorithms on it between two calls: contacts are placed by its oMi.
   pinocchio::Data& getData() { return data_; }
-  /// Mass of the robot [kg].
-  double getMass() const { return mass_; }
+  /// Mass of the robot [kg]; 0 before initialize().
+  double getMass() const { return isInitialized() ? mass_ : 0.; }
 
   /// Height of the flat horizontal ground in the world, 0 by default [m].
   double getGroundHeight() const { return ground_height_; }
