@@ -254,6 +254,8 @@ struct MotionExaminer::Workspace {
   const internal::MotionSweep com_sweep, sweep;  // of nothing, and of contacts and parts
   const internal::MotionDistribution distribution;
   internal::Workers workers;
+  // Of the progress, which several threads may have to tell; one that is told may examine, too.
+  internal::PerProcess<std::recursive_mutex> telling;
 
  private:
   class Pipeline;
@@ -302,6 +304,7 @@ class MotionExaminer::Workspace::Pipeline {
     const double before = done_++;
     const auto frames = double(recorded_.time.size());
     return [this, before, frames](Eigen::Index done) {
+      const std::lock_guard<std::recursive_mutex> lock(workspace_.telling.get());
       progress_((before + double(done) / frames) / passes_);
     };
   }
