@@ -94,12 +94,12 @@ void exposeCentroidal() {
       "computeVRP", &computeVRP, (bp::arg("state"), bp::arg("omega")),
       "Virtual repellent point c - d²c/dt² / omega², equation (7), (2,) [m]; NaN where that is\n"
       "beyond the largest numbers.\n\n"
-      "omega: > 0 [rad/s], else ValueError.");
+      "omega: finite and > 0 [rad/s], else ValueError.");
   bp::def(
       "computeDCM", &computeDCM, (bp::arg("state"), bp::arg("omega")),
       "Divergent component of motion c + dc/dt / omega, equation (20), (2,) [m]; NaN where that\n"
       "is beyond the largest numbers.\n\n"
-      "omega: > 0 [rad/s], else ValueError.");
+      "omega: finite and > 0 [rad/s], else ValueError.");
 }
 
 }  // namespace dynacom::python

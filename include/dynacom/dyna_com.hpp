@@ -185,7 +185,8 @@ class DYNACOM_EXPORT DynaCoM {
   /// (7, 8), of the last computeDynamics(). Where that has distributed the wrench, because the
   /// ground is not flat, c̈ is getFeasibleACoM(), so that p and v are those of one motion.
   /// @param omega  ω > 0 [rad/s]
-  /// @throws std::invalid_argument unless ω > 0; NotReadyError before computeDynamics()
+  /// @throws std::invalid_argument unless ω is finite and > 0; NotReadyError before
+  ///         computeDynamics()
   void computeNL(double omega);
 
   /// computeDynamics() and computeNL(omega).
