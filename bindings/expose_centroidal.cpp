@@ -31,10 +31,13 @@ CentroidalState applyWrench(const CentroidalState& state, const CentroidalWrench
 }
 
 Eigen::Vector2d flatGroundCoP(const CentroidalWrench& wrench, const bp::object& com,
-                              double ground_height, double minimal_vertical_force) {
+                              Real ground_height, Real minimal_vertical_force) {
   return computeFlatGroundCoP(wrench, toVector<3>("com", com), ground_height,
                               minimal_vertical_force);
 }
+
+Eigen::Vector2d vrp(const CentroidalState& state, Real omega) { return computeVRP(state, omega); }
+Eigen::Vector2d dcm(const CentroidalState& state, Real omega) { return computeDCM(state, omega); }
 
 }  // namespace
 
@@ -91,12 +94,12 @@ void exposeCentroidal() {
           "Centre of pressure on flat horizontal ground, equation (5), (2,), world [m]; NaN where\n"
           "the vertical force is below minimalVerticalForce [N].");
   bp::def(
-      "computeVRP", &computeVRP, (bp::arg("state"), bp::arg("omega")),
+      "computeVRP", &vrp, (bp::arg("state"), bp::arg("omega")),
       "Virtual repellent point c - d²c/dt² / omega², equation (7), (2,) [m]; NaN where that is\n"
       "beyond the largest numbers.\n\n"
       "omega: finite and > 0 [rad/s], else ValueError.");
   bp::def(
-      "computeDCM", &computeDCM, (bp::arg("state"), bp::arg("omega")),
+      "computeDCM", &dcm, (bp::arg("state"), bp::arg("omega")),
       "Divergent component of motion c + dc/dt / omega, equation (20), (2,) [m]; NaN where that\n"
       "is beyond the largest numbers.\n\n"
       "omega: finite and > 0 [rad/s], else ValueError.");

@@ -26,17 +26,17 @@ std::string write(const DynaCoM& robot) {
 using VectorRef = DynaCoM::VectorRef;
 
 void computeDynamics(DynaCoM& self, const VectorRef& q, const VectorRef& v, const VectorRef& a,
-                     const bp::object& ext_wrench, bool flat_horizontal_ground) {
+                     const bp::object& ext_wrench, Truth flat_horizontal_ground) {
   self.computeDynamics(q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
 void computeDynamicsOfData(DynaCoM& self, const pinocchio::Data& data, const bp::object& ext_wrench,
-                           bool flat_horizontal_ground) {
+                           Truth flat_horizontal_ground) {
   self.computeDynamics(data, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
-void computeNL(DynaCoM& self, double omega, const VectorRef& q, const VectorRef& v,
-               const VectorRef& a, const bp::object& ext_wrench, bool flat_horizontal_ground) {
+void computeNL(DynaCoM& self, Real omega, const VectorRef& q, const VectorRef& v,
+               const VectorRef& a, const bp::object& ext_wrench, Truth flat_horizontal_ground) {
   self.computeNL(omega, q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
@@ -44,6 +44,11 @@ DistributionStatus distributeForce(DynaCoM& self, const bp::object& force, const
                                    const bp::object& com) {
   return self.distributeForce(toVector<3>("groundCoMForce", force),
                               toVector<3>("groundCoMTorque", torque), toVector<3>("com", com));
+}
+
+void addContact(DynaCoM& self, const std::shared_ptr<ContactBase>& contact, const std::string& name,
+                Truth active) {
+  self.addContact(contact, name, active);
 }
 
 }  // namespace
@@ -93,12 +98,12 @@ void exposeDynaCoM() {
       .def("getMass", &DynaCoM::getMass, bp::arg("self"), "Mass of the robot [kg].")
       .def("getGroundHeight", &DynaCoM::getGroundHeight, bp::arg("self"),
            "Height of the flat horizontal ground [m].")
-      .def("setGroundHeight", &DynaCoM::setGroundHeight, (bp::arg("self"), bp::arg("groundHeight")),
+      .def("setGroundHeight", method(&DynaCoM::setGroundHeight, "groundHeight"),
            "Height of the flat horizontal ground, finite [m].")
       .def("getMinimalVerticalForce", &DynaCoM::getMinimalVerticalForce, bp::arg("self"),
            "Below this vertical force a centre of pressure means nothing [N]; 1 by default.")
-      .def("setMinimalVerticalForce", &DynaCoM::setMinimalVerticalForce,
-           (bp::arg("self"), bp::arg("minimalVerticalForce")),
+      .def("setMinimalVerticalForce",
+           method(&DynaCoM::setMinimalVerticalForce, "minimalVerticalForce"),
            "ValueError unless minimalVerticalForce is finite and > 0 [N].")
       .def("getWrenchWeights", &DynaCoM::getWrenchWeights, bp::arg("self"), Copied(),
            "Weights of the norm in which a wrench out of reach is replaced by the closest, (6,).")
@@ -109,12 +114,11 @@ void exposeDynaCoM() {
       .def("getWarmStart", &DynaCoM::getWarmStart, bp::arg("self"),
            "Whether a distribution starts from the inequalities that were active in the last one,\n"
            "contact by contact; True by default.")
-      .def("setWarmStart", &DynaCoM::setWarmStart, (bp::arg("self"), bp::arg("warmStart")),
+      .def("setWarmStart", method(&DynaCoM::setWarmStart, "warmStart"),
            "Whether it does, see WrenchDistribution.setWarmStart().")
       .def("getMaximalIterations", &DynaCoM::getMaximalIterations, bp::arg("self"),
            "How many iterations a distribution may take.")
-      .def("setMaximalIterations", &DynaCoM::setMaximalIterations,
-           (bp::arg("self"), bp::arg("maximalIterations")),
+      .def("setMaximalIterations", method(&DynaCoM::setMaximalIterations, "maximalIterations"),
            "How many it may take, 100,000 by default; a controller sets 50, see\n"
            "WrenchDistribution.setMaximalIterations(). ValueError unless maximalIterations > 0.")
 
@@ -161,11 +165,10 @@ void exposeDynaCoM() {
           "what the last distribution since computeDynamics achieved; NaN before.")
       .def("getFeasibleAMVariation", &DynaCoM::getFeasibleAMVariation, bp::arg("self"), Copied(),
            "The same for the rate of the angular momentum, (3,) [N·m].")
-      .def<void (DynaCoM::*)(double)>(
-          "computeNL", &DynaCoM::computeNL, (bp::arg("self"), bp::arg("omega")),
-          "Computes virtual repellent point and non-linearity, (7, 8), of the last\n"
-          "computeDynamics; where that has distributed the wrench, with getFeasibleACoM().\n"
-          "omega: > 0 [rad/s], else ValueError.")
+      .def("computeNL", method<DynaCoM, void, double>(&DynaCoM::computeNL, "omega"),
+           "Computes virtual repellent point and non-linearity, (7, 8), of the last\n"
+           "computeDynamics; where that has distributed the wrench, with getFeasibleACoM().\n"
+           "omega: finite and > 0 [rad/s], else ValueError.")
       .def("computeNL", &computeNL,
            (bp::arg("self"), bp::arg("omega"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
             bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
@@ -175,7 +178,7 @@ void exposeDynaCoM() {
       .def("getNL", &DynaCoM::getNL, bp::arg("self"), Copied(), "Non-linearity p - v, (2,) [m].")
 
       .def(
-          "addContact", &DynaCoM::addContact,
+          "addContact", &addContact,
           (bp::arg("self"), bp::arg("contact"), bp::arg("name"), bp::arg("active") = true),
           "Makes a contact known under a name. It is shared, not copied. Raises ValueError if the\n"
           "name is taken, the contact known, here or to another DynaCoM, or not initialised, or "
@@ -189,7 +192,7 @@ void exposeDynaCoM() {
       .def("deactivateContact", &DynaCoM::deactivateContact, (bp::arg("self"), bp::arg("name")),
            "The contact takes no part any more, its force becomes zero. Raises ValueError if the\n"
            "name is not known.")
-      .def("addContact6d", &DynaCoM::addContact6d,
+      .def("addContact6d", &addContact,
            (bp::arg("self"), bp::arg("contact"), bp::arg("name"), bp::arg("active") = true),
            "Another name of addContact.")
       .def("removeContact6d", &DynaCoM::removeContact6d, (bp::arg("self"), bp::arg("name")),

@@ -23,8 +23,7 @@ std::string writeMismatch(const DerivativeMismatch& mismatch) {
                           ", acceleration=", mismatch.acceleration, ")");
 }
 
-bp::object filter(const pinocchio::Model& model, const Eigen::MatrixXd& q, double rate,
-                  double cutoff) {
+bp::object filter(const pinocchio::Model& model, const Eigen::MatrixXd& q, Real rate, Real cutoff) {
   const auto compute = [&] {
     const WithoutLock without_lock;
     return filterConfigurations(model, q.transpose(), rate, cutoff);
