@@ -18,7 +18,7 @@ namespace dynacom::python {
 
 namespace bp = boost::python;
 
-void takeNumpyScalars();
+void takeNumbers();
 void exposeCentroidal();
 void exposeGroundPlane();
 void exposeContactBase();
@@ -42,9 +42,25 @@ void exposeTerrain();
 void exposeMotionStatistics();
 void exposeMotionExamination();
 
+/// A number of Python's or of numpy's, as parameters of functions are. A process has one registry
+/// of Boost.Python's converters: those of double itself and the like would act on Pinocchio's
+/// functions, and those of every other module, too.
+template <class Value>
+struct Number {
+  operator Value() const { return value; }
+  Value value;
+};
+using Real = Number<double>;
+using Integer = Number<int>;
+using Index = Number<std::size_t>;
+using Truth = Number<bool>;
+
+/// Numpy's number as that of Python's which is of the same kind as the one that is there; all else
+/// as it is.
+bp::object toNumberAs(const bp::object& present, const bp::object& value);
+
 /// The numbers of an array, a list or a tuple; everything else is a TypeError. Not a converter of
-/// Boost.Python's: that would be one for Pinocchio's functions too, and choose among their
-/// overloads.
+/// Boost.Python's, for the same reason.
 Eigen::VectorXd toNumbers(const char* name, const bp::object& values, int size);
 
 /// Where an array of that many numbers holds them, if they lie there one after the other as double,
@@ -87,6 +103,16 @@ bp::object method(Result (Class::*member)(const Eigen::Matrix<double, size, 1>&)
       },
       bp::default_call_policies(), (bp::arg("self"), bp::arg(name)),
       boost::mpl::vector3<Result, Class&, const bp::object&>());
+}
+
+/// A method that takes a number and nothing else.
+template <class Class, class Result, class Value>
+std::enable_if_t<std::is_arithmetic_v<Value>, bp::object> method(Result (Class::*member)(Value),
+                                                                 const char* name) {
+  return bp::make_function(
+      [member](Class& self, Number<Value> number) { return (self.*member)(number); },
+      bp::default_call_policies(), (bp::arg("self"), bp::arg(name)),
+      boost::mpl::vector3<Result, Class&, Number<Value>>());
 }
 
 /// A matrix as an array with two dimensions: a matrix of one row or column would have only one.
@@ -199,8 +225,8 @@ struct CopyVisitor : bp::def_visitor<CopyVisitor<Class>> {
   static Class deepcopy(const Class& self, const bp::dict&) { return self; }
 };
 
-/// Sets an attribute that there is. Python would make a new one of a misspelt name, and say
-/// nothing.
+/// Sets an attribute that there is, to numpy's numbers as to Python's. Python would make a new one
+/// of a misspelt name, and say nothing.
 void setKnownAttribute(const bp::object& self, const bp::str& name, const bp::object& value);
 
 /// "[1 2 3]", as in the printing of settings.

@@ -30,16 +30,23 @@ CentroidalState applyWrench(const CentroidalState& state, const CentroidalWrench
                            toVector<6>("extWrench", ext_wrench));
 }
 
+Eigen::Vector3d vrp3D(const CentroidalState& state, Real omega) {
+  return computeVRP3D(state, omega);
+}
+
 Eigen::Vector3d enhancedMomentPivot(const CentroidalState& state, const bp::object& gravity,
-                                    double omega) {
+                                    Real omega) {
   return computeECMP(state, toVector<3>("gravity", gravity), omega);
 }
 
 Eigen::Vector2d flatGroundCoP(const CentroidalWrench& wrench, const bp::object& com,
-                              double ground_height, double minimal_vertical_force) {
+                              Real ground_height, Real minimal_vertical_force) {
   return computeFlatGroundCoP(wrench, toVector<3>("com", com), ground_height,
                               minimal_vertical_force);
 }
+
+Eigen::Vector2d vrp(const CentroidalState& state, Real omega) { return computeVRP(state, omega); }
+Eigen::Vector2d dcm(const CentroidalState& state, Real omega) { return computeDCM(state, omega); }
 
 }  // namespace
 
@@ -96,26 +103,26 @@ void exposeCentroidal() {
           "Centre of pressure on flat horizontal ground, equation (5), (2,), world [m]; NaN where\n"
           "the vertical force is below minimalVerticalForce [N].");
   bp::def(
-      "computeVRP", &computeVRP, (bp::arg("state"), bp::arg("omega")),
+      "computeVRP", &vrp, (bp::arg("state"), bp::arg("omega")),
       "Virtual repellent point c - d²c/dt² / omega², equation (7), (2,) [m]; NaN where that is\n"
       "beyond the largest numbers.\n\n"
-      "omega: > 0 [rad/s], else ValueError.");
-  bp::def("computeVRP3D", &computeVRP3D, (bp::arg("state"), bp::arg("omega")),
+      "omega: finite and > 0 [rad/s], else ValueError.");
+  bp::def("computeVRP3D", &vrp3D, (bp::arg("state"), bp::arg("omega")),
           "Virtual repellent point in three dimensions, (3,) [m], of which computeVRP is x and y:\n"
           "the total force on the robot, gravity's included, is m omega² (c - v). NaN where that\n"
           "is beyond the largest numbers.\n\n"
-          "omega: > 0 [rad/s], else ValueError.");
+          "omega: finite and > 0 [rad/s], else ValueError.");
   bp::def("computeECMP", &enhancedMomentPivot,
           (bp::arg("state"), bp::arg("gravity"), bp::arg("omega")),
           "Enhanced centroidal moment pivot e = c - (d²c/dt² - g) / omega², equation (23), (3,)\n"
           "[m]: the force on the robot besides gravity's is m omega² (c - e). NaN where that is\n"
           "beyond the largest numbers.\n\n"
-          "gravity: (3,), world [m/s²]; omega: > 0 [rad/s], else ValueError.");
+          "gravity: (3,), world [m/s²]; omega: finite and > 0 [rad/s], else ValueError.");
   bp::def(
-      "computeDCM", &computeDCM, (bp::arg("state"), bp::arg("omega")),
+      "computeDCM", &dcm, (bp::arg("state"), bp::arg("omega")),
       "Divergent component of motion c + dc/dt / omega, equation (20), (2,) [m]; NaN where that\n"
       "is beyond the largest numbers.\n\n"
-      "omega: > 0 [rad/s], else ValueError.");
+      "omega: finite and > 0 [rad/s], else ValueError.");
 }
 
 }  // namespace dynacom::python

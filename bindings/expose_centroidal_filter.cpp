@@ -36,7 +36,7 @@ std::string writeChange(const CentroidalChange& change) {
 
 CentroidalChange find(const PartRobot& parts, const bp::object& motions,
                       const MotionAnalysis& dynamics, const ContactSchedule& schedule,
-                      const Settings& settings, const bp::object& free, int threads) {
+                      const Settings& settings, const bp::object& free, Integer threads) {
   const auto own_motions = toVectorOf<ContactMotion>(motions);
   Eigen::Array<bool, Eigen::Dynamic, 1> free_frames;
   if (!free.is_none())

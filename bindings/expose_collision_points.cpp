@@ -6,8 +6,8 @@ namespace dynacom::python {
 
 namespace {
 
-std::shared_ptr<BodyPoints> makeBody(const std::string& link, pinocchio::JointIndex joint,
-                                     const bp::object& points, const bp::object& radius) {
+std::shared_ptr<BodyPoints> makeBody(const std::string& link, Index joint, const bp::object& points,
+                                     const bp::object& radius) {
   const auto body = std::make_shared<BodyPoints>();
   body->link = link;
   body->joint = joint;

@@ -42,17 +42,16 @@ void exposeContact6D() {
            "a setting is out of its range, and then nothing has changed.")
       .def("getSettings", &Contact6D::getSettings, bp::arg("self"), Copied(),
            "A copy of the settings.")
-      .def("setMu", &Contact6D::setMu, (bp::arg("self"), bp::arg("mu")),
-           "Friction coefficient, >= 0.")
-      .def("setGu", &Contact6D::setGu, (bp::arg("self"), bp::arg("gu")), "Yaw friction, >= 0 [m].")
+      .def("setMu", method(&Contact6D::setMu, "mu"), "Friction coefficient, >= 0.")
+      .def("setGu", method(&Contact6D::setGu, "gu"), "Yaw friction, >= 0 [m].")
       .def("setForceWeights", method(&Contact6D::setForceWeights, "force_weights"),
            "force_weights: (3,), > 0 [1/N].")
       .def("setTorqueWeights", method(&Contact6D::setTorqueWeights, "torque_weights"),
            "torque_weights: (3,), > 0 [1/(N·m)].")
-      .def("setSurfaceHalfWidth", &Contact6D::setSurfaceHalfWidth,
-           (bp::arg("self"), bp::arg("half_width")), "half_width: >= 0 [m].")
-      .def("setSurfaceHalfLength", &Contact6D::setSurfaceHalfLength,
-           (bp::arg("self"), bp::arg("half_length")), "half_length: >= 0 [m].")
+      .def("setSurfaceHalfWidth", method(&Contact6D::setSurfaceHalfWidth, "half_width"),
+           "half_width: >= 0 [m].")
+      .def("setSurfaceHalfLength", method(&Contact6D::setSurfaceHalfLength, "half_length"),
+           "half_length: >= 0 [m].")
       .def(PrintVisitor<Contact6D>(&write));
 }
 

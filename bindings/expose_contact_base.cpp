@@ -37,7 +37,7 @@ void exposeContactBase() {
            "Name of the contact's frame in the robot's model.")
       .def("getFrameID", &ContactBase::getFrameID, bp::arg("self"),
            "Index of that frame in a model; a very large number before DynaCoM.addContact.")
-      .def("setFrameID", &ContactBase::setFrameID, (bp::arg("self"), bp::arg("frame_id")),
+      .def("setFrameID", method(&ContactBase::setFrameID, "frame_id"),
            "Tells which frame of a model is the contact's. DynaCoM does.")
       .def("getRevision", &ContactBase::getRevision, bp::arg("self"),
            "Number of the matrices but for ne_A: another one whenever they may have changed, and "

@@ -119,7 +119,7 @@ std::string writeInference(const ContactInference& found) {
 }
 
 ContactInference infer(const PartRobot& parts, const bp::object& motions,
-                       const MotionAnalysis& dynamics, bool exact,
+                       const MotionAnalysis& dynamics, Truth exact,
                        const DetectionSettings& settings, const bp::object& recorded) {
   const auto own_motions = toVectorOf<ContactMotion>(motions);
   const ContactSchedule* known =

@@ -39,8 +39,7 @@ void exposeContactPoint() {
            "a setting is out of its range, and then nothing has changed.")
       .def("getSettings", &ContactPoint::getSettings, bp::arg("self"), Copied(),
            "A copy of the settings.")
-      .def("setMu", &ContactPoint::setMu, (bp::arg("self"), bp::arg("mu")),
-           "Friction coefficient, >= 0.")
+      .def("setMu", method(&ContactPoint::setMu, "mu"), "Friction coefficient, >= 0.")
       .def("setForceWeights", method(&ContactPoint::setForceWeights, "force_weights"),
            "force_weights: (3,), > 0 [1/N].")
       .def(PrintVisitor<ContactPoint>(&write));

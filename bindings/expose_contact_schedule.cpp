@@ -43,7 +43,8 @@ std::string writeContactMotion(const ContactMotion& contact) {
                           ")");
 }
 
-bp::list listContactMotions(const DynaCoM& robot, const Motion& motion, int threads, int lanes) {
+bp::list listContactMotions(const DynaCoM& robot, const Motion& motion, Integer threads,
+                            Integer lanes) {
   const auto compute = [&, own_robot = DynaCoM(robot)] {
     const WithoutLock without_lock;
     return computeContactMotions(own_robot, motion, threads, lanes);

@@ -15,10 +15,6 @@ bp::list toList(const std::vector<std::string>& names) {
 bp::list getActiveContacts(const DynaCoM& self) { return toList(self.getActiveContacts()); }
 bp::list getKnownContacts(const DynaCoM& self) { return toList(self.getKnownContacts()); }
 
-std::shared_ptr<ContactBase> getContact(const DynaCoM& self, const std::string& name) {
-  return self.getContact(name);
-}
-
 std::string write(const DynaCoM& robot) {
   if (!robot.isInitialized()) return "DynaCoM()";
   const pinocchio::Model& model = robot.getModel();
@@ -30,12 +26,12 @@ std::string write(const DynaCoM& robot) {
 using VectorRef = DynaCoM::VectorRef;
 
 void computeDynamics(DynaCoM& self, const VectorRef& q, const VectorRef& v, const VectorRef& a,
-                     const bp::object& ext_wrench, bool flat_horizontal_ground) {
+                     const bp::object& ext_wrench, Truth flat_horizontal_ground) {
   self.computeDynamics(q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
 void computeDynamicsOfData(DynaCoM& self, const pinocchio::Data& data, const bp::object& ext_wrench,
-                           bool flat_horizontal_ground) {
+                           Truth flat_horizontal_ground) {
   self.computeDynamics(data, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
@@ -50,12 +46,12 @@ void computeDynamicsOfDataOnPlane(DynaCoM& self, const pinocchio::Data& data,
   self.computeDynamics(data, toVector<6>("extWrench", ext_wrench), ground);
 }
 
-void computeNL(DynaCoM& self, double omega, const VectorRef& q, const VectorRef& v,
-               const VectorRef& a, const bp::object& ext_wrench, bool flat_horizontal_ground) {
+void computeNL(DynaCoM& self, Real omega, const VectorRef& q, const VectorRef& v,
+               const VectorRef& a, const bp::object& ext_wrench, Truth flat_horizontal_ground) {
   self.computeNL(omega, q, v, a, toVector<6>("extWrench", ext_wrench), flat_horizontal_ground);
 }
 
-void computeNLOnPlane(DynaCoM& self, double omega, const VectorRef& q, const VectorRef& v,
+void computeNLOnPlane(DynaCoM& self, Real omega, const VectorRef& q, const VectorRef& v,
                       const VectorRef& a, const bp::object& ext_wrench, const GroundPlane& ground) {
   self.computeNL(omega, q, v, a, toVector<6>("extWrench", ext_wrench), ground);
 }
@@ -64,6 +60,11 @@ DistributionStatus distributeForce(DynaCoM& self, const bp::object& force, const
                                    const bp::object& com) {
   return self.distributeForce(toVector<3>("groundCoMForce", force),
                               toVector<3>("groundCoMTorque", torque), toVector<3>("com", com));
+}
+
+void addContact(DynaCoM& self, const std::shared_ptr<ContactBase>& contact, const std::string& name,
+                Truth active) {
+  self.addContact(contact, name, active);
 }
 
 }  // namespace
@@ -113,13 +114,13 @@ void exposeDynaCoM() {
       .def("getMass", &DynaCoM::getMass, bp::arg("self"), "Mass of the robot [kg].")
       .def("getGroundHeight", &DynaCoM::getGroundHeight, bp::arg("self"),
            "Height of the flat horizontal ground [m].")
-      .def("setGroundHeight", &DynaCoM::setGroundHeight, (bp::arg("self"), bp::arg("groundHeight")),
+      .def("setGroundHeight", method(&DynaCoM::setGroundHeight, "groundHeight"),
            "Height of the flat horizontal ground, finite [m].")
       .def("getMinimalVerticalForce", &DynaCoM::getMinimalVerticalForce, bp::arg("self"),
            "Below this vertical force a centre of pressure means nothing, nor what is on a\n"
            "GroundPlane below this force along its normal [N]; 1 by default.")
-      .def("setMinimalVerticalForce", &DynaCoM::setMinimalVerticalForce,
-           (bp::arg("self"), bp::arg("minimalVerticalForce")),
+      .def("setMinimalVerticalForce",
+           method(&DynaCoM::setMinimalVerticalForce, "minimalVerticalForce"),
            "ValueError unless minimalVerticalForce is finite and > 0 [N].")
       .def("getWrenchWeights", &DynaCoM::getWrenchWeights, bp::arg("self"), Copied(),
            "Weights of the norm in which a wrench out of reach is replaced by the closest, (6,).")
@@ -130,12 +131,11 @@ void exposeDynaCoM() {
       .def("getWarmStart", &DynaCoM::getWarmStart, bp::arg("self"),
            "Whether a distribution starts from the inequalities that were active in the last one,\n"
            "contact by contact; True by default.")
-      .def("setWarmStart", &DynaCoM::setWarmStart, (bp::arg("self"), bp::arg("warmStart")),
+      .def("setWarmStart", method(&DynaCoM::setWarmStart, "warmStart"),
            "Whether it does, see WrenchDistribution.setWarmStart().")
       .def("getMaximalIterations", &DynaCoM::getMaximalIterations, bp::arg("self"),
            "How many iterations a distribution may take.")
-      .def("setMaximalIterations", &DynaCoM::setMaximalIterations,
-           (bp::arg("self"), bp::arg("maximalIterations")),
+      .def("setMaximalIterations", method(&DynaCoM::setMaximalIterations, "maximalIterations"),
            "How many it may take, 100,000 by default; a controller sets 50, see\n"
            "WrenchDistribution.setMaximalIterations(). ValueError unless maximalIterations > 0.")
 
@@ -146,7 +146,7 @@ void exposeDynaCoM() {
            "contacts and the centre of pressure: by (5) on flat horizontal ground, else by (6),\n"
            "after distributing the wrench. All results are NaN if a number is not finite, or "
            "becomes\n"
-           "so.\n\n"
+           "so, or a quaternion's norm is not 1.\n\n"
            "q: (nq,); v: (nv,); a: (nv,); extWrench: (6,), force [N] and moment [N·m] about the\n"
            "centre of mass. Raises ValueError if one has another size.")
       .def(
@@ -202,11 +202,10 @@ void exposeDynaCoM() {
           "what the last distribution since computeDynamics achieved; NaN before.")
       .def("getFeasibleAMVariation", &DynaCoM::getFeasibleAMVariation, bp::arg("self"), Copied(),
            "The same for the rate of the angular momentum, (3,) [N·m].")
-      .def<void (DynaCoM::*)(double)>(
-          "computeNL", &DynaCoM::computeNL, (bp::arg("self"), bp::arg("omega")),
-          "Computes virtual repellent point and non-linearity, (7, 8), of the last\n"
-          "computeDynamics; where that has distributed the wrench, with getFeasibleACoM().\n"
-          "omega: > 0 [rad/s], else ValueError.")
+      .def("computeNL", method<DynaCoM, void, double>(&DynaCoM::computeNL, "omega"),
+           "Computes virtual repellent point and non-linearity, (7, 8), of the last\n"
+           "computeDynamics; where that has distributed the wrench, with getFeasibleACoM().\n"
+           "omega: finite and > 0 [rad/s], else ValueError.")
       .def("computeNL", &computeNL,
            (bp::arg("self"), bp::arg("omega"), bp::arg("q"), bp::arg("v"), bp::arg("a"),
             bp::arg("extWrench") = no_wrench, bp::arg("flatHorizontalGround") = true),
@@ -224,10 +223,12 @@ void exposeDynaCoM() {
            "Enhanced centroidal moment pivot of the last computeNL, (23), (3,) [m].")
 
       .def(
-          "addContact", &DynaCoM::addContact,
+          "addContact", &addContact,
           (bp::arg("self"), bp::arg("contact"), bp::arg("name"), bp::arg("active") = true),
           "Makes a contact known under a name. It is shared, not copied. Raises ValueError if the\n"
-          "name is taken, the contact known or not initialised, or its frame not in the model.")
+          "name is taken, the contact known, here or to another DynaCoM, or not initialised, or "
+          "its\n"
+          "frame not in the model.")
       .def("removeContact", &DynaCoM::removeContact, (bp::arg("self"), bp::arg("name")),
            "Forgets a contact. Raises ValueError if the name is not known.")
       .def("activateContact", &DynaCoM::activateContact, (bp::arg("self"), bp::arg("name")),
@@ -236,7 +237,7 @@ void exposeDynaCoM() {
       .def("deactivateContact", &DynaCoM::deactivateContact, (bp::arg("self"), bp::arg("name")),
            "The contact takes no part any more, its force becomes zero. Raises ValueError if the\n"
            "name is not known.")
-      .def("addContact6d", &DynaCoM::addContact6d,
+      .def("addContact6d", &addContact,
            (bp::arg("self"), bp::arg("contact"), bp::arg("name"), bp::arg("active") = true),
            "Another name of addContact.")
       .def("removeContact6d", &DynaCoM::removeContact6d, (bp::arg("self"), bp::arg("name")),
@@ -255,7 +256,7 @@ void exposeDynaCoM() {
       .def("resetContactPose", &DynaCoM::resetContactPose, (bp::arg("self"), bp::arg("name")),
            "Places a contact by the model again, from the next computeDynamics() or\n"
            "distributeForce() on. Raises ValueError if the name is not known.")
-      .def("getContact", &getContact, (bp::arg("self"), bp::arg("name")),
+      .def("getContact", &DynaCoM::getContact, (bp::arg("self"), bp::arg("name")),
            "The contact of that name. Raises ValueError if it is not known.")
       .def("getActiveContacts", &getActiveContacts, bp::arg("self"),
            "Names of the active contacts, in the order of their activation.")

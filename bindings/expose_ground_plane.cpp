@@ -12,12 +12,12 @@ std::shared_ptr<GroundPlane> makeGroundPlane(const bp::object& point, const bp::
 }
 
 Eigen::Vector3d centreOfPressure(const CentroidalWrench& wrench, const bp::object& com,
-                                 const GroundPlane& plane, double minimal_normal_force) {
+                                 const GroundPlane& plane, Real minimal_normal_force) {
   return computeCoP(wrench, toVector<3>("com", com), plane, minimal_normal_force);
 }
 
 Eigen::Vector3d momentPivot(const bp::object& force, const bp::object& com,
-                            const GroundPlane& plane, double minimal_normal_force) {
+                            const GroundPlane& plane, Real minimal_normal_force) {
   return computeCMP(toVector<3>("groundForce", force), toVector<3>("com", com), plane,
                     minimal_normal_force);
 }

@@ -23,8 +23,7 @@ std::string writeMismatch(const DerivativeMismatch& mismatch) {
                           ", acceleration=", mismatch.acceleration, ")");
 }
 
-bp::object filter(const pinocchio::Model& model, const Eigen::MatrixXd& q, double rate,
-                  double cutoff) {
+bp::object filter(const pinocchio::Model& model, const Eigen::MatrixXd& q, Real rate, Real cutoff) {
   const auto compute = [&] {
     const WithoutLock without_lock;
     return filterConfigurations(model, q.transpose(), rate, cutoff);
@@ -74,6 +73,7 @@ void exposeMotion() {
       .def(PrintVisitor<DerivativeMismatch>(&writeMismatch))
       .def(CopyVisitor<DerivativeMismatch>());
 
+  bp::scope().attr("kMinimalCutoff") = kMinimalCutoff;
   bp::scope().attr("kMaximalCutoff") = kMaximalCutoff;
   bp::def(
       "filterConfigurations", &filter,
@@ -82,8 +82,9 @@ void exposeMotion() {
       "filter of fourth order, forward and backward, so that nothing is delayed and the gain at\n"
       "the cut-off is 1/2. Positions of free-flyers are filtered in the world, orientations and\n"
       "joints in the tangent space at the filter's last output.\n\n"
-      "rate: frames per second [Hz]; cutoff: above 0 and below kMaximalCutoff * rate [Hz].\n"
-      "Raises ValueError for others, and for configurations that are not valid.");
+      "rate: frames per second [Hz]; cutoff: from kMinimalCutoff * rate to below\n"
+      "kMaximalCutoff * rate [Hz]. Raises ValueError for others, and for configurations that are\n"
+      "not valid.");
   bp::def("differentiate", &differentiateRows, (bp::arg("model"), bp::arg("time"), bp::arg("q")),
           "The Motion through configurations (T, nq) at times (T,): velocities and accelerations\n"
           "are those of the parabola through a frame and its two neighbours, in the tangent space\n"

@@ -42,8 +42,8 @@ bp::object getContactActive(const MotionAnalysis::Contact& contact) {
 }
 
 MotionAnalysis analyze(const DynaCoM& robot, const Motion& motion, const ContactSchedule& schedule,
-                       bool flat_horizontal_ground, double omega, const bp::object& progress,
-                       int threads, int lanes) {
+                       Truth flat_horizontal_ground, Real omega, const bp::object& progress,
+                       Integer threads, Integer lanes) {
   AnalysisSettings settings;
   settings.flat_horizontal_ground = flat_horizontal_ground;
   settings.omega = omega;
@@ -54,6 +54,8 @@ MotionAnalysis analyze(const DynaCoM& robot, const Motion& motion, const Contact
   const WithoutLock without_lock;
   return analyzeMotion(own_robot, motion, schedule, settings);
 }
+
+int count(const DynaCoM& robot, Integer lanes) { return countLanes(robot, lanes); }
 
 }  // namespace
 
@@ -75,9 +77,11 @@ void exposeMotionAnalysis() {
       "the work, 0 for as many as the machine has, with the same results bit for bit; lanes: how\n"
       "many frames a thread computes at once, at most, see countLanes. Raises ValueError if "
       "motion\n"
-      "or schedule is not valid, or names a contact that the robot does not know.");
+      "or schedule is not valid, or names a contact that the robot does not know; but a frame "
+      "with\n"
+      "a quaternion whose norm is not 1 is NaN, and its status InvalidInput.");
   bp::def(
-      "countLanes", &countLanes, (bp::arg("robot"), bp::arg("lanes") = kMaximalLanes),
+      "countLanes", &count, (bp::arg("robot"), bp::arg("lanes") = kMaximalLanes),
       "How many lanes of SIMD registers this machine has for a robot, and no more than so many:\n"
       "8 with AVX-512, 4 with AVX2, 1 where there is neither, or the robot has joints or\n"
       "contacts that lanes do not know.");

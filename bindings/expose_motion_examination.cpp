@@ -27,7 +27,7 @@ bp::object getDistance(const Examination& examination) {
 bp::list getSeats(const Examination& examination) { return toList(examination.seats); }
 
 std::shared_ptr<Seat> makeSeat(const std::string& link, Eigen::Index first, Eigen::Index behind,
-                               double height, double weight_share) {
+                               Real height, Real weight_share) {
   return std::make_shared<Seat>(Seat{link, first, behind, height, weight_share});
 }
 
@@ -56,13 +56,11 @@ std::string writeExaminer(const MotionExaminer& examiner) {
                           ", threads=", settings.analysis.threads, ")");
 }
 
-std::shared_ptr<MotionExaminer> makeExaminer(const DynaCoM& robot, double cutoff,
-                                             bool flat_horizontal_ground, double omega,
-                                             const DetectionSettings& detection,
-                                             const VerdictSettings& verdict, bool sensitivity,
-                                             const bp::object& progress, int threads, int lanes,
-                                             const bp::object& bodies, bool distance,
-                                             const CentroidalFilterSettings& filter) {
+std::shared_ptr<MotionExaminer> makeExaminer(
+    const DynaCoM& robot, Real cutoff, Truth flat_horizontal_ground, Real omega,
+    const DetectionSettings& detection, const VerdictSettings& verdict, Truth sensitivity,
+    const bp::object& progress, Integer threads, Integer lanes, const bp::object& bodies,
+    Truth distance, const CentroidalFilterSettings& filter) {
   const AnalysisSettings analysis = {flat_horizontal_ground, omega, nullptr, threads, lanes};
   const ExaminationSettings settings = {cutoff,
                                         analysis,

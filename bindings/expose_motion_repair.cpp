@@ -72,7 +72,7 @@ RepairGround findGround(const PartRobot& parts, const ContactInference& inferenc
 
 RepairedMotion repair(const PartRobot& parts, const Motion& motion, const ContactSchedule& schedule,
                       const Settings& settings, const bp::object& free, const RepairGround& ground,
-                      const bp::object& start, bool anew) {
+                      const bp::object& start, Truth anew) {
   Eigen::Array<bool, Eigen::Dynamic, 1> free_frames;
   if (!free.is_none())
     free_frames = bp::extract<Eigen::Matrix<bool, Eigen::Dynamic, 1>>(free)().array();

@@ -43,9 +43,9 @@ std::string writeRepairer(const MotionRepairer& repairer) {
 }
 
 std::shared_ptr<MotionRepairer> makeRepairer(const DynaCoM& robot, const MotionExaminer& examiner,
-                                             const RepairSettings& repair, bool strict, int rounds,
-                                             double largest_displacement, double largest_turn,
-                                             double largest_stretch) {
+                                             const RepairSettings& repair, Truth strict,
+                                             Integer rounds, Real largest_displacement,
+                                             Real largest_turn, Real largest_stretch) {
   const RepairerSettings settings = {examiner.getSettings(), repair,       strict,         rounds,
                                      largest_displacement,   largest_turn, largest_stretch};
   return std::make_shared<MotionRepairer>(robot, settings);

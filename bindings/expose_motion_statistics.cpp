@@ -31,8 +31,8 @@ std::string writeContact(const ContactStatistics& contact) {
                           ", weight_share=", contact.weight_share, ")");
 }
 
-std::shared_ptr<BodyStatistics> makeBody(const std::string& link, double active_share,
-                                         double weight_share, double largest_vertical_force) {
+std::shared_ptr<BodyStatistics> makeBody(const std::string& link, Real active_share,
+                                         Real weight_share, Real largest_vertical_force) {
   return std::make_shared<BodyStatistics>(
       BodyStatistics{link, active_share, weight_share, largest_vertical_force});
 }

@@ -61,14 +61,14 @@ std::string writeLimit(const FaultLimit& limit) {
                           ")");
 }
 
-std::shared_ptr<FaultLimit> makeLimit(double limit, double allowed_share) {
+std::shared_ptr<FaultLimit> makeLimit(Real limit, Real allowed_share) {
   return std::make_shared<FaultLimit>(FaultLimit{limit, allowed_share});
 }
 
 MotionVerdict judge(const DynaCoM& robot, const Motion& motion, const RecordedMotion& recorded,
                     const bp::object& contacts, const Eigen::MatrixXd& ground,
-                    const MotionAnalysis& analysis, const VerdictSettings& settings, int threads,
-                    const bp::object& unsure) {
+                    const MotionAnalysis& analysis, const VerdictSettings& settings,
+                    Integer threads, const bp::object& unsure) {
   const auto own_contacts = toVectorOf<ContactMotion>(contacts);
   const DynaCoM own_robot(robot);  // without the lock, others may change it and the settings
   const VerdictSettings own_settings(settings);

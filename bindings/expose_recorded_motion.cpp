@@ -14,7 +14,7 @@ Eigen::MatrixXd toColumns(const bp::object& rows) {
 
 std::shared_ptr<RecordedMotion> makeRecorded(const Eigen::VectorXd& time, const Eigen::MatrixXd& q,
                                              const bp::object& v, const bp::object& a,
-                                             const bp::object& schedule, bool is_exact) {
+                                             const bp::object& schedule, Truth is_exact) {
   RecordedMotion recorded{time, q.transpose()};
   recorded.v = toColumns(v);
   recorded.a = toColumns(a);
@@ -48,13 +48,12 @@ bp::object getUnsure(const DerivedMotion& derived) {
   return bp::object(unsure);
 }
 
-DerivedMotion derive(const pinocchio::Model& model, const RecordedMotion& recorded, double cutoff) {
+DerivedMotion derive(const pinocchio::Model& model, const RecordedMotion& recorded, Real cutoff) {
   const WithoutLock without_lock;
   return deriveMotion(model, recorded, cutoff);
 }
 
-DerivedMotion rederive(const pinocchio::Model& model, const RecordedMotion& recorded,
-                       double cutoff) {
+DerivedMotion rederive(const pinocchio::Model& model, const RecordedMotion& recorded, Real cutoff) {
   const WithoutLock without_lock;
   return rederiveMotion(model, recorded, cutoff);
 }

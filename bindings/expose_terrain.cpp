@@ -34,7 +34,7 @@ std::string writeTerrain(const Terrain& terrain) {
 
 Terrain find(const bp::object& parts, const ContactInference& inference,
              const ContactSchedule& schedule, const Eigen::MatrixXd& ground,
-             const Eigen::VectorXd& time, double ground_height) {
+             const Eigen::VectorXd& time, Real ground_height) {
   return findTerrain(toVectorOf<PartRobot::Part>(parts), inference, schedule, ground.transpose(),
                      time, ground_height);
 }

@@ -14,9 +14,19 @@ void addMatrices(WrenchDistribution& self, const Eigen::MatrixXd& A, const Eigen
   self.add(A, weights, NE);
 }
 
-DistributionStatus solve(WrenchDistribution& self, const bp::object& wrench, double minimal_scale) {
+DistributionStatus solve(WrenchDistribution& self, const bp::object& wrench, Real minimal_scale) {
   return self.solve(toVector<6>("wrench", wrench), minimal_scale);
 }
+
+void reserve(WrenchDistribution& self, const ContactBase& contact, Index slot) {
+  self.reserve(contact, slot);
+}
+
+void addInSlot(WrenchDistribution& self, const ContactBase& contact, Index slot) {
+  self.add(contact, slot);
+}
+
+bool isOptimal(const DistributionResult& self, Real tolerance) { return self.isOptimal(tolerance); }
 
 bp::list getContacts(const DistributionResult& self) {
   bp::list contacts;
@@ -123,8 +133,7 @@ void exposeWrenchDistribution() {
                           "W^2 lambda = NE' nu - A' mu.")
             .def("forces", &DistributionResult::forces, bp::arg("self"),
                  "The forces of all contacts, one behind the other.")
-            .def("isOptimal", &DistributionResult::isOptimal,
-                 (bp::arg("self"), bp::arg("tolerance") = 1e-6),
+            .def("isOptimal", &isOptimal, (bp::arg("self"), bp::arg("tolerance") = 1e-6),
                  "Whether the answer is optimal, judged by what stands in this result alone:\n"
                  "forces within the inequalities, the cheapest that give the achieved wrench, and\n"
                  "no reachable wrench closer. False for InvalidInput and NumericalFailure, and\n"
@@ -189,16 +198,15 @@ void exposeWrenchDistribution() {
           "computeMargin() may be wrong. ValueError unless all are finite and > 0.")
       .def("getWrenchWeights", &WrenchDistribution::getWrenchWeights, bp::arg("self"), Copied(),
            "Those weights, (6,).")
-      .def("setWarmStart", &WrenchDistribution::setWarmStart,
-           (bp::arg("self"), bp::arg("warmStart")),
+      .def("setWarmStart", method(&WrenchDistribution::setWarmStart, "warmStart"),
            "Whether solve() starts from the inequalities that were active in each slot's last\n"
            "answer, as is the default; else it starts with none. A slot that takes no part in up\n"
            "to ten solve() still knows its own afterwards; after more it starts with none. That\n"
            "changes how long it takes, and answers by no more than rounding.")
       .def("getWarmStart", &WrenchDistribution::getWarmStart, bp::arg("self"),
            "Whether it does; True by default.")
-      .def("setMaximalIterations", &WrenchDistribution::setMaximalIterations,
-           (bp::arg("self"), bp::arg("maximalIterations")),
+      .def("setMaximalIterations",
+           method(&WrenchDistribution::setMaximalIterations, "maximalIterations"),
            "How many iterations solve() may take, kMaximalIterations by default: those of\n"
            "DistributionResult.iterations. Of feet on level ground nearly all problems take less\n"
            "than 10; a problem that needs more than this ends as NumericalFailure. A controller\n"
@@ -206,8 +214,7 @@ void exposeWrenchDistribution() {
            "maximalIterations > 0.")
       .def("getMaximalIterations", &WrenchDistribution::getMaximalIterations, bp::arg("self"),
            "How many iterations solve() may take.")
-      .def("reserve", &WrenchDistribution::reserve,
-           (bp::arg("self"), bp::arg("contact"), bp::arg("slot")),
+      .def("reserve", &reserve, (bp::arg("self"), bp::arg("contact"), bp::arg("slot")),
            "Gets a slot's storage ready for a contact, so that a problem with it allocates\n"
            "nothing, whichever of the other slots take part. ValueError if the contact was never\n"
            "initialised, slot is more than the number of slots that there are, or it is taken.")
@@ -222,10 +229,9 @@ void exposeWrenchDistribution() {
           "Adds a contact, with the matrices that it has now, in the slot of its position.\n"
           "ValueError if it was never initialised, or the slot is taken; NotReadyError if\n"
           "updateNewtonEuler() never placed it.")
-      .def<void (WrenchDistribution::*)(const ContactBase&, std::size_t)>(
-          "add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact"), bp::arg("slot")),
-          "The same in another slot, for contacts that are not always the same ones. ValueError,\n"
-          "too, if slot is more than the number of slots that there are.")
+      .def("add", &addInSlot, (bp::arg("self"), bp::arg("contact"), bp::arg("slot")),
+           "The same in another slot, for contacts that are not always the same ones. ValueError,\n"
+           "too, if slot is more than the number of slots that there are.")
       .def("add", &addMatrices, (bp::arg("self"), bp::arg("A"), bp::arg("weights"), bp::arg("NE")),
            "Adds a contact by its matrices, in the slot of its position: inequalities\n"
            "A lambda <= 0, (m, n); weights > 0 of the cost, (n,); NE, (6, n), takes lambda to the\n"

@@ -28,7 +28,7 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   const bp::docstring_options docstrings(/*user*/ true, /*python signatures*/ true, /*C++*/ false);
   bp::scope().attr("__version__") = DYNACOM_VERSION;
   bp::register_exception_translator<dynacom::NotReadyError>(&translate);
-  takeNumpyScalars();
+  takeNumbers();
   exposeCentroidal();
   exposeGroundPlane();
   exposeContactBase();

@@ -39,7 +39,7 @@ Eigen::VectorXd toNumbers(const char* name, const bp::object& values, int size) 
   Eigen::VectorXd numbers(bp::len(values));
   for (Eigen::Index k = 0; k < numbers.size(); ++k) {
     const bp::object value = values[k];
-    const bp::extract<double> number(value);
+    const bp::extract<Real> number(value);
     if (!number.check())
       refuse(name, size,
              internal::concat(typeName(value), " as number ", k, " of a ", typeName(values)));
@@ -69,7 +69,11 @@ void setKnownAttribute(const bp::object& self, const bp::str& name, const bp::ob
                  name.ptr());
     bp::throw_error_already_set();
   }
-  if (PyObject_GenericSetAttr(self.ptr(), name.ptr(), value.ptr()) != 0)
+  const bp::handle<> property(bp::allow_null(PyObject_GetAttr(type, name.ptr())));
+  if (!property) PyErr_Clear();
+  const bool is_field = property && PyObject_TypeCheck(property.get(), &PyProperty_Type);
+  const bp::object own = is_field ? toNumberAs(self.attr(name), value) : value;
+  if (PyObject_GenericSetAttr(self.ptr(), name.ptr(), own.ptr()) != 0)
     bp::throw_error_already_set();
 }
 

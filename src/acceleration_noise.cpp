@@ -99,7 +99,7 @@ double internal::estimateAccelerationNoise(const pinocchio::Model& model,
       const Eigen::Vector3d noise =
           measureWindow(&times[static_cast<std::size_t>(k)], points.middleCols<kNodes>(k));
       for (std::size_t axis = 0; axis < 3; ++axis)
-        measured[axis].push_back(noise[static_cast<Eigen::Index>(axis)]);
+        measured[axis].push_back(internal::orInfinity(noise[static_cast<Eigen::Index>(axis)]));
     }
   if (measured[0].empty()) return internal::kNaN;
   double square = 0.;

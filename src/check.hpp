@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #pragma once
 
+#include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -47,6 +48,7 @@ void changeField(Settings& settings, Value Settings::*field, const Value& value)
 /// Refuses a natural frequency of the linear inverted pendulum.
 inline void requireOmega(double omega) {
   if (!(omega > 0.)) throwInvalid("omega must be > 0 rad/s, got ", omega);
+  if (std::isinf(omega)) throwInvalid("omega must be finite, got ", omega, " rad/s");
 }
 
 /// Refuses a vector or matrix of the wrong size.

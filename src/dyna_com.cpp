@@ -9,6 +9,7 @@
 
 #include "check.hpp"
 #include "contact_frame.hpp"
+#include "motion_check.hpp"
 #include "nan.hpp"
 #include "standard_gravity.hpp"
 #include "urdf.hpp"
@@ -28,6 +29,10 @@ constexpr double kSameMass = 1e-9;
 CentroidalState unknownState(double mass) {
   const Eigen::Vector3d nan = Eigen::Vector3d::Constant(kNaN);
   return {mass, nan, nan, nan, nan, nan};
+}
+
+pinocchio::SE3 unknownPlacement() {
+  return {Eigen::Matrix3d::Constant(kNaN), Eigen::Vector3d::Constant(kNaN)};
 }
 
 bool isFinite(const CentroidalState& state) {
@@ -54,17 +59,21 @@ std::ostream& operator<<(std::ostream& out, const DynaCoMSettings& settings) {
              << settings.gravity.transpose() << "])";
 }
 
-DynaCoM::Entry::Entry(std::string name, std::shared_ptr<ContactBase> contact, std::size_t slot)
-    : name(std::move(name)), contact(std::move(contact)), slot(slot) {}
+DynaCoM::OwnContact::OwnContact(std::shared_ptr<ContactBase> contact)
+    : contact_(std::move(contact)) {
+  contact_->taken_.value = true;
+}
 
-DynaCoM::Entry::Entry(const Entry& other)
-    : name(other.name),
-      contact(other.contact->clone()),
-      slot(other.slot),
-      active(other.active),
-      measured(other.measured) {}
+DynaCoM::OwnContact::OwnContact(const OwnContact& other) : OwnContact(other->clone()) {}
 
-DynaCoM::Entry& DynaCoM::Entry::operator=(const Entry& other) { return *this = Entry(other); }
+DynaCoM::OwnContact& DynaCoM::OwnContact::operator=(OwnContact other) noexcept {
+  contact_.swap(other.contact_);
+  return *this;
+}
+
+DynaCoM::OwnContact::~OwnContact() {
+  if (contact_) contact_->taken_.value = false;
+}
 
 DynaCoM::DynaCoM() { forgetMotion(); }
 DynaCoM::DynaCoM(const DynaCoMSettings& settings) { initialize(settings); }
@@ -89,11 +98,13 @@ void DynaCoM::setModel(pinocchio::Model&& model, DynaCoMSettings&& settings) {
   if (!(mass > 0.)) throwInvalid("the robot '", model.name, "' must have a mass > 0, got ", mass);
   if (std::isinf(mass)) throwInvalid("the robot '", model.name, "' must have a finite mass");
   pinocchio::Data data(model);
+  auto configuration_check = std::make_shared<const internal::ConfigurationCheck>(model);
   for (Entry& entry : contacts_) entry.contact->deactivate();
   contacts_.clear();
   settings_ = std::move(settings);
   model_ = std::move(model);
   data_ = std::move(data);
+  configuration_check_ = std::move(configuration_check);
   mass_ = mass;
   forgetMotion();
 }
@@ -159,7 +170,11 @@ void DynaCoM::readMotion(const VectorRef& q, const VectorRef& v, const VectorRef
   updateFrames();
   const CentroidalState state = computeCentroidalState(model_, data_, q, v, a);
   const bool finite = areFinite(q) && areFinite(v) && areFinite(a);
-  takeMotion(state, finite, extWrench);
+  const bool normalized = configuration_check_->isNormalized(model_, q);
+  // Numbers that are not finite make all placements so that hang on them; wrong norms do not.
+  if (finite && !normalized)
+    for (pinocchio::SE3& oMi : data_.oMi) oMi = unknownPlacement();
+  takeMotion(state, finite && normalized, extWrench);
 }
 
 void DynaCoM::readMotion(const pinocchio::Data& data, const Vector6& extWrench) {
@@ -252,16 +267,18 @@ void DynaCoM::addContact(const std::shared_ptr<ContactBase>& contact, const std:
   if (contact->cols() == 0) throwInvalid("contact '", name, "' was never initialised");
   for (const Entry& entry : contacts_) {
     if (entry.name == name) throwInvalid("there is a contact '", name, "' already");
-    if (entry.contact == contact)
+    if (entry.contact.get() == contact)
       throwInvalid("contact '", name, "' is known already, as '", entry.name, "'");
   }
+  if (contact->taken_.value)
+    throwInvalid("contact '", name, "' serves another DynaCoM: this one needs a copy of it");
   updateFrames();
   // Whatever index the contact holds may be another model's.
   const pinocchio::FrameIndex frame_id = findFrame(model_, contact->getFrameName(), name);
   const std::size_t slot = findFreeSlot();
   distribution_.clear();  // the slot may be that of a contact that was removed
   distribution_.reserve(*contact, slot);
-  contacts_.emplace_back(name, contact, slot);
+  contacts_.push_back({name, OwnContact(contact), slot});
   contact->setFrameID(frame_id);
   contact->deactivate();
   if (hasMotion()) place(contacts_.back(), state_.com);
@@ -355,8 +372,8 @@ void DynaCoM::setContactPose(const std::string& name, const pinocchio::SE3& oMs)
 
 void DynaCoM::resetContactPose(const std::string& name) { find(name)->measured = false; }
 
-const std::shared_ptr<ContactBase>& DynaCoM::getContact(const std::string& name) const {
-  return find(name)->contact;
+std::shared_ptr<ContactBase> DynaCoM::getContact(const std::string& name) const {
+  return find(name)->contact.get();
 }
 
 std::vector<std::string> DynaCoM::getActiveContacts() const {
@@ -409,16 +426,17 @@ Eigen::Vector3d DynaCoM::getCMP(const GroundPlane& plane) const {
 }
 
 bool DynaCoM::isLoaded(const ContactBase& contact) const {
-  return contact.appliedForce()[2] >= minimal_vertical_force_;
+  // What was assigned to a contact may never have been initialised, and has no force.
+  return contact.cols() > 0 && contact.appliedForce()[2] >= minimal_vertical_force_;
 }
 
 Eigen::Vector2d DynaCoM::getContactCoP(const std::string& name) const {
-  const ContactBase& contact = *getContact(name);
+  const ContactBase& contact = *find(name)->contact;
   return isLoaded(contact) ? contact.getCoP() : Eigen::Vector2d::Constant(kNaN);
 }
 
 double DynaCoM::getUsage(const std::string& name, double (ContactBase::*usage)() const) const {
-  const ContactBase& contact = *getContact(name);
+  const ContactBase& contact = *find(name)->contact;
   const double value = (contact.*usage)();
   return std::isnan(value) || isLoaded(contact) ? value : 0.;
 }
@@ -428,7 +446,7 @@ double DynaCoM::getContactFrictionUsage(const std::string& name) const {
 }
 
 double DynaCoM::getContactCoPMargin(const std::string& name) const {
-  const ContactBase& contact = *getContact(name);
+  const ContactBase& contact = *find(name)->contact;
   return isLoaded(contact) ? contact.getCoPMargin() : kNaN;
 }
 

@@ -221,16 +221,15 @@ template <class Space>
 void filterComponents(const Space& space, double rate, double cutoff, Eigen::MatrixXd& q) {
   const Eigen::Index frames = q.cols(), rows = Eigen::Index(space.components.size());
   if (rows == 0) return;
+  const auto inPeriods = [&](double count) {
+    return static_cast<Eigen::Index>(std::ceil(count * rate / cutoff));
+  };
   // Eight periods of the cut-off are enough for the filter to have forgotten how it began.
-  const auto periods = static_cast<Eigen::Index>(std::ceil(8. * rate / cutoff));
-  const Eigen::Index padding = std::min(frames - 1, periods);
+  const Eigen::Index padding = std::min(frames - 1, inPeriods(8.));
   Eigen::MatrixXd padded(rows, frames + 2 * padding);
   for (Eigen::Index frame = 0; frame < frames; ++frame)
     for (Eigen::Index row = 0; row < rows; ++row)
       padded(row, padding + frame) = q(space.components[static_cast<std::size_t>(row)], frame);
-  const auto inPeriods = [&](double count) {
-    return static_cast<Eigen::Index>(std::ceil(count * rate / cutoff));
-  };
   const Eigen::Index fitted =
       std::min(std::max(inPeriods(kEndPeriods), kLeastEndSteps), frames - 1);
   const Eigen::VectorXd weights =
@@ -282,6 +281,9 @@ Eigen::MatrixXd filterConfigurations(const pinocchio::Model& model, const Eigen:
   if (!(cutoff > 0.) || !(cutoff < kMaximalCutoff * rate))
     throwInvalid("cutoff must be > 0 and < ", kMaximalCutoff * rate, " Hz, which is ",
                  kMaximalCutoff, " of the frame rate, got ", cutoff, " Hz");
+  if (!(cutoff >= kMinimalCutoff * rate))
+    throwInvalid("cutoff must be >= ", kMinimalCutoff * rate, " Hz, which is ", kMinimalCutoff,
+                 " of the frame rate, got ", cutoff, " Hz");
   const Eigen::Index frames = q.cols();
   requireConfigurations(model, q, frames);
   if (frames < 2) return q;
@@ -363,7 +365,8 @@ DerivativeMismatch compareDerivatives(const pinocchio::Model& model, const Motio
       size += 0.5 * (from.squaredNorm() + to.squaredNorm());
     }
     double ratio(double steps, double least) const {
-      return std::sqrt(mismatch / steps) / std::max(std::sqrt(size / steps), least);
+      return internal::orInfinity(std::sqrt(mismatch / steps) /
+                                  std::max(std::sqrt(size / steps), least));
     }
   };
   const std::size_t count = begins.size() - 1;

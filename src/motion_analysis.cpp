@@ -39,7 +39,7 @@ MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
   const internal::MotionDistribution distribution(carrier, settings.lanes);
   internal::Workers workers(settings.threads);
 
-  if (!internal::MotionCheck(model).hasSizes(motion)) motion.validate(model);
+  if (!internal::hasSizes(model, motion)) internal::requireNumbers(model, motion);
   schedule.validate(motion.frames());
   for (const std::string& name : schedule.names) robot.getContact(name);
   std::vector<ContactMotion> contacts;

@@ -43,15 +43,22 @@ void requireFrames(const char* name, const Eigen::MatrixXd& values, Eigen::Index
 }
 
 void requireConfigurations(const pinocchio::Model& model, const Eigen::MatrixXd& q,
-                           Eigen::Index frames) {
-  requireFrames("q", q, model.nq, "components (nq)", frames);
-  const MotionCheck check(model);
+                           Eigen::Index frames, const char* name) {
+  requireFrames(name, q, model.nq, "components (nq)", frames);
+  const ConfigurationCheck check(model);
   for (Eigen::Index frame = 0; frame < frames; ++frame)
-    if (!check.isConfiguration(q.col(frame)))
-      throwInvalid("q must have quaternions of norm 1, got another in frame ", frame);
+    if (!check.isNormalized(model, q.col(frame)))
+      throwInvalid(name, " must have quaternions of norm 1, got another in frame ", frame);
 }
 
-MotionCheck::MotionCheck(const pinocchio::Model& model) : model_(model) {
+void requireNumbers(const pinocchio::Model& model, const Motion& motion) {
+  requireTime(motion.time);
+  requireFrames("q", motion.q, model.nq, "components (nq)", motion.frames());
+  requireFrames("v", motion.v, model.nv, "components (nv)", motion.frames());
+  requireFrames("a", motion.a, model.nv, "components (nv)", motion.frames());
+}
+
+ConfigurationCheck::ConfigurationCheck(const pinocchio::Model& model) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(model.njoints); ++k) {
     const pinocchio::JointModel& joint = model.joints[k];
     if (joint.nq() == joint.nv()) continue;
@@ -67,27 +74,27 @@ MotionCheck::MotionCheck(const pinocchio::Model& model) : model_(model) {
   }
 }
 
-bool MotionCheck::hasSizes(const Motion& motion) const {
+bool ConfigurationCheck::isNormalized(const pinocchio::Model& model,
+                                      const Eigen::Ref<const Eigen::VectorXd>& q) const {
+  if (!is_known_) return pinocchio::isNormalized(model, q, kNormalized);
+  for (const Circle& circle : circles_)
+    if (!(std::abs(q.segment(circle.first, circle.size).norm() - 1.) <= kNormalized)) return false;
+  return true;
+}
+
+bool hasSizes(const pinocchio::Model& model, const Motion& motion) {
   const Eigen::Index frames = motion.frames();
-  if (frames == 0 || motion.q.rows() != model_.nq || motion.q.cols() != frames) return false;
+  if (frames == 0 || motion.q.rows() != model.nq || motion.q.cols() != frames) return false;
   for (const Eigen::MatrixXd* values : {&motion.v, &motion.a})
-    if (values->rows() != model_.nv || values->cols() != frames) return false;
+    if (values->rows() != model.nv || values->cols() != frames) return false;
   if (!areFinite(motion.time)) return false;
   for (Eigen::Index frame = 1; frame < frames; ++frame)
     if (!(motion.time[frame] > motion.time[frame - 1])) return false;
   return true;
 }
 
-bool MotionCheck::isConfiguration(const Eigen::Ref<const Eigen::VectorXd>& q) const {
-  if (!areFinite(q)) return false;
-  if (!is_known_) return pinocchio::isNormalized(model_, q, kNormalized);
-  for (const Circle& circle : circles_)
-    if (!(std::abs(q.segment(circle.first, circle.size).norm() - 1.) <= kNormalized)) return false;
-  return true;
-}
-
-bool MotionCheck::isValid(const Motion& motion, Eigen::Index frame) const {
-  return isConfiguration(motion.q.col(frame)) && areFinite(motion.v.col(frame)) &&
+bool isFinite(const Motion& motion, Eigen::Index frame) {
+  return areFinite(motion.q.col(frame)) && areFinite(motion.v.col(frame)) &&
          areFinite(motion.a.col(frame));
 }
 

@@ -13,9 +13,17 @@ namespace dynacom::internal {
 
 namespace {
 
+// The mean of the heights that are known.
+double findMeanHeight(const Eigen::Matrix3Xd& com) {
+  const auto heights = com.row(2);
+  if (areFinite(heights)) return heights.mean();
+  const auto known = heights.array().isFinite();
+  return known.select(heights.array(), 0.).sum() / double(known.count());
+}
+
 // √(g / mean height of the CoM above the ground), the natural frequency of the pendulum.
 double computeOmega(const Eigen::Matrix3Xd& com, double gravity, double ground_height) {
-  const double height = com.row(2).mean() - ground_height;
+  const double height = findMeanHeight(com) - ground_height;
   const double omega = std::sqrt(gravity / height);
   return omega > 0. && std::isfinite(omega) ? omega : kNaN;
 }

@@ -162,7 +162,8 @@ Mask findMissing(const ContactSplit& split, const SweptMotion& swept,
   const double weight = split.carrier.mass * internal::findUnitGravity(split.carrier.gravity);
   internal::SupportMeter support(split.carrier, swept.parts, swept.analysis);
   const auto isMissing = [&](Eigen::Index frame) {
-    const double force = inference.missing(0, frame), torque = inference.missing(1, frame);
+    const double force = internal::orInfinity(inference.missing(0, frame));
+    const double torque = internal::orInfinity(inference.missing(1, frame));
     const auto active = inference.schedule.active.col(frame);
     if (!active.any()) return std::max(force, torque) > settings.flight_with_support_needed.limit;
     if (force > settings.residual_force.limit || torque > settings.residual_torque.limit)
@@ -253,6 +254,8 @@ struct MotionExaminer::Workspace {
   const internal::MotionSweep com_sweep, sweep;  // of nothing, and of contacts and parts
   const internal::MotionDistribution distribution;
   internal::Workers workers;
+  // Of the progress, which several threads may have to tell; one that is told may examine, too.
+  internal::PerProcess<std::recursive_mutex> telling;
 
  private:
   class Pipeline;
@@ -301,6 +304,7 @@ class MotionExaminer::Workspace::Pipeline {
     const double before = done_++;
     const auto frames = double(recorded_.time.size());
     return [this, before, frames](Eigen::Index done) {
+      const std::lock_guard<std::recursive_mutex> lock(workspace_.telling.get());
       progress_((before + double(done) / frames) / passes_);
     };
   }
@@ -319,7 +323,9 @@ class MotionExaminer::Workspace::Pipeline {
     std::vector<double> cutoffs;
     if (settings_.sensitivity && derived.cutoff > 0.)
       for (const double cutoff : {0.5 * derived.cutoff, 2. * derived.cutoff})
-        if (cutoff < kMaximalCutoff * derived.frame_rate) cutoffs.push_back(cutoff);
+        if (cutoff >= kMinimalCutoff * derived.frame_rate &&
+            cutoff < kMaximalCutoff * derived.frame_rate)
+          cutoffs.push_back(cutoff);
     return cutoffs;
   }
 

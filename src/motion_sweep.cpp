@@ -13,7 +13,7 @@ namespace dynacom::internal {
 
 namespace {
 
-// A frame's numbers are not those of a motion; Motion::validate() says what is wrong.
+// A frame's numbers are not finite; requireNumbers() says which.
 struct InvalidFrame {};
 
 bool isFinite(const CentroidalState& state, const CentroidalWrench& wrench) {
@@ -56,7 +56,11 @@ class MotionSweep::Worker {
         placed_.push_back({fixed.contact->clone(), fixed.contact->getCorners()});
     }
     if (dynamics_) {
-      if (!check_.isValid(motion_, frame)) throw InvalidFrame();
+      if (!isFinite(motion_, frame)) throw InvalidFrame();
+      if (!check_.isNormalized(model_, motion_.q.col(frame))) {
+        writeUnknown(frame);
+        return;
+      }
       computeDynamics(frame);
     } else {
       pinocchio::forwardKinematics(model_, *data_, motion_.q.col(frame), motion_.v.col(frame));
@@ -67,15 +71,33 @@ class MotionSweep::Worker {
 
   // Numbers that are too large to be computed with are not known at all.
   void computeDynamics(Eigen::Index frame) {
-    CentroidalState state = computeCentroidalState(model_, *data_, motion_.q.col(frame),
-                                                   motion_.v.col(frame), motion_.a.col(frame));
-    CentroidalWrench wrench =
+    const CentroidalState state = computeCentroidalState(
+        model_, *data_, motion_.q.col(frame), motion_.v.col(frame), motion_.a.col(frame));
+    const CentroidalWrench wrench =
         computeGroundWrench(state, model_.gravity.linear(), DynaCoM::Vector6::Zero());
-    if (!isFinite(state, wrench)) {
-      const Eigen::Vector3d nan = Eigen::Vector3d::Constant(kNaN);
-      state = {state.mass, nan, nan, nan, nan, nan};
-      wrench = {nan, nan};
+    if (isFinite(state, wrench))
+      write(frame, state, wrench);
+    else
+      writeUnknownDynamics(frame);
+  }
+
+  // Of what is no configuration nothing is known.
+  void writeUnknown(Eigen::Index frame) {
+    writeUnknownDynamics(frame);
+    for (ContactMotion& contact : contacts_) {
+      contact.position.col(frame).setConstant(kNaN);
+      contact.rotation.col(frame).setConstant(kNaN);
+      contact.height[frame] = kNaN;
+      contact.velocity.col(frame).setConstant(kNaN);
     }
+  }
+
+  void writeUnknownDynamics(Eigen::Index frame) {
+    const Eigen::Vector3d nan = Eigen::Vector3d::Constant(kNaN);
+    write(frame, {kNaN, nan, nan, nan, nan, nan}, {nan, nan});
+  }
+
+  void write(Eigen::Index frame, const CentroidalState& state, const CentroidalWrench& wrench) {
     dynamics_->com.col(frame) = state.com;
     dynamics_->vcom.col(frame) = state.vcom;
     dynamics_->acom.col(frame) = state.acom;
@@ -113,7 +135,7 @@ class MotionSweep::Worker {
   const Motion& motion_;
   std::vector<ContactMotion>& contacts_;
   MotionAnalysis* const dynamics_;
-  const MotionCheck check_;
+  const ConfigurationCheck check_;
   const pinocchio::Model& model_;
   std::optional<LaneSweeper> lanes_;
   std::shared_ptr<pinocchio::Data> data_;
@@ -130,7 +152,7 @@ MotionSweep::MotionSweep(const pinocchio::Model& model, std::vector<FixedContact
 void MotionSweep::run(const Motion& motion, Workers& workers, std::vector<ContactMotion>& contacts,
                       MotionAnalysis* dynamics,
                       const std::function<void(Eigen::Index)>& progress) const {
-  if (!MotionCheck(model_).hasSizes(motion)) motion.validate(model_);
+  if (!hasSizes(model_, motion)) requireNumbers(model_, motion);
   const Eigen::Index frames = motion.frames();
   contacts.resize(contacts_.size());
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -156,7 +178,7 @@ void MotionSweep::run(const Motion& motion, Workers& workers, std::vector<Contac
         },
         progress);
   } catch (const InvalidFrame&) {
-    motion.validate(model_);
+    requireNumbers(model_, motion);
     throw;
   }
 }

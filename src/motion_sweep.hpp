@@ -30,7 +30,8 @@ class MotionSweep {
   /// @param dynamics  is given its time, and from com to ground_torque what MotionAnalysis says,
   ///                  nothing of contacts; null if nobody wants that: then the motion must be valid
   /// @param progress  as that of forEachBlock()
-  /// @throws std::invalid_argument if the motion is not valid
+  /// @throws std::invalid_argument as requireNumbers(); a frame whose quaternions have another norm
+  ///         than 1 is NaN
   void run(const Motion& motion, Workers& workers, std::vector<ContactMotion>& contacts,
            MotionAnalysis* dynamics,
            const std::function<void(Eigen::Index)>& progress = nullptr) const;

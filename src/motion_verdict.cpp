@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "check.hpp"
+#include "motion_check.hpp"
 #include "motion_judgement.hpp"
 #include "motion_windows.hpp"
 #include "nan.hpp"
@@ -92,7 +93,7 @@ double groundAt(const Eigen::MatrixXd& ground, Eigen::Index k, Eigen::Index fram
 
 // How fast a contact moves along the ground in a frame.
 double slidingSpeed(const ContactMotion& contact, Eigen::Index frame) {
-  return contact.velocity.col(frame).head<2>().norm();
+  return orInfinity(contact.velocity.col(frame).head<2>().norm());
 }
 
 // @param unmeasured   how many frames do not count
@@ -123,9 +124,9 @@ void measureNormals(const internal::JudgedMotion& judged, const VerdictSettings&
       const auto rotation = contacts[k].rotation.col(frame);
       const double z = 1. - 2. * (rotation[0] * rotation[0] + rotation[1] * rotation[1]);
       up += z;
-      if (!(z < 0.)) continue;
+      if (z >= 0.) continue;
       ++downward;
-      const double angle = std::asin(std::min(-z, 1.));
+      const double angle = orInfinity(std::asin(std::min(-z, 1.)));
       if (angle <= measured[frame]) continue;
       measured[frame] = angle;
       whose[static_cast<std::size_t>(frame)] = k;
@@ -184,9 +185,7 @@ void requireFitting(const DynaCoM& robot, const Motion& motion, const RecordedMo
                     const MotionAnalysis& analysis, const Mask& unsure) {
   const Eigen::Index frames = motion.frames();
   const auto count = static_cast<Eigen::Index>(contacts.size());
-  requireSize("recorded.q", recorded.q.cols(), frames, "frames");
-  requireSize("recorded.q", recorded.q.rows(), Eigen::Index(robot.getModel().nq),
-              "components (nq)");
+  internal::requireConfigurations(robot.getModel(), recorded.q, frames, "recorded.q");
   for (const Eigen::Matrix3Xd* values :
        {&analysis.ground_force, &analysis.ground_torque, &analysis.com})
     requireSize("analysis", values->cols(), frames, "frames");
@@ -386,9 +385,11 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
       measure(MotionFault::CoPOutside)[frame] =
           support.measure(frame, [&](std::size_t k) { return analysis.contacts[k].active[frame]; });
   };
-  // How far a contact is below its ground; not a number where that is not known.
+  // How far a contact is below its ground; not a number where there is none.
   const auto findDepth = [&](Eigen::Index k, Eigen::Index frame) {
-    return groundAt(judged.ground, k, frame) - contacts[static_cast<std::size_t>(k)].height[frame];
+    const double ground = groundAt(judged.ground, k, frame);
+    if (std::isnan(ground)) return kNaN;
+    return orInfinity(ground - contacts[static_cast<std::size_t>(k)].height[frame]);
   };
   forEachBlock(workers, frames, [&]() -> BlockWork {
     return [&, support = SupportMeter(judged.carrier, contacts, analysis)](
@@ -402,7 +403,7 @@ MotionVerdict internal::judgeMotion(const JudgedMotion& judged, const VerdictSet
           if (!analysis.contacts[k].active[frame]) continue;
           flies = false;
           if (!judged.near_jumps[frame])
-            sliding = std::max(sliding, orInfinity(slidingSpeed(contacts[k], frame)));
+            sliding = std::max(sliding, slidingSpeed(contacts[k], frame));
         }
         if (!verdict.unsure[frame]) judgeForces(frame, flies, support);
       }

@@ -44,7 +44,8 @@ void estimateNoise(const internal::Derivation& derivation, const Eigen::VectorXd
   const double rate = derived.frame_rate;
   derived.noise = derived.thinned_noise = estimate(1);
   if (rate >= 1.5 * kThinnedRate) {
-    const auto stride = static_cast<Eigen::Index>(std::round(rate / kThinnedRate));
+    const auto stride =
+        static_cast<Eigen::Index>(std::min(std::round(rate / kThinnedRate), double(time.size())));
     const double thinned = estimate(stride);
     if (!std::isnan(thinned)) derived.thinned_noise = thinned;
   }

@@ -2,13 +2,16 @@
 #include "urdf.hpp"
 
 #include <console_bridge/console.h>
+#include <pthread.h>
 #include <urdf_parser/urdf_parser.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
 #include <pinocchio/multibody/joint.hpp>
 #include <pinocchio/parsers/urdf.hpp>
+#include <thread>
 
 #include "check.hpp"
 
@@ -16,34 +19,63 @@ namespace dynacom::internal {
 
 namespace {
 
-// Takes what the URDF parser would print, for as long as it lives. The parser's output is one for
-// the whole process, so only one thread can have it at a time.
+// What others print goes to the handler that was there before.
+struct Handler final : console_bridge::OutputHandler {
+  void log(const std::string& message, console_bridge::LogLevel level, const char* file,
+           int line) override {
+    if (std::this_thread::get_id() != thread) {
+      if (former && level >= former_level) former->log(message, level, file, line);
+    } else if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) {
+      text += (text.empty() ? "" : "; ") + message;
+    }
+  }
+  console_bridge::OutputHandler* former = nullptr;
+  console_bridge::LogLevel former_level = console_bridge::CONSOLE_BRIDGE_LOG_NONE;
+  std::thread::id thread;  // that reads
+  std::string text;
+};
+
+// Takes what the URDF parser would print in this thread, for as long as it lives. What other
+// threads print meanwhile by the same means goes where it would have gone.
+//
+// The parser's output is one for the whole process, so only one thread can have it at a time. A
+// process is forked before or after that: in the copy nobody would give it back.
 class ParserErrors {
  public:
-  ParserErrors() : lock_(mutex_) {
+  ParserErrors() : lock_(lockOutput()) {
+    // There is a handler, and the one before it, which restoring exchanges.
+    handler_.former = console_bridge::getOutputHandler();
+    handler_.former_level = console_bridge::getLogLevel();
+    handler_.thread = std::this_thread::get_id();
     handler_.text.clear();
+    console_bridge::restorePreviousOutputHandler();
+    before_ = console_bridge::getOutputHandler();
     console_bridge::useOutputHandler(&handler_);
+    console_bridge::setLogLevel(
+        std::min(handler_.former_level, console_bridge::CONSOLE_BRIDGE_LOG_ERROR));
   }
-  ~ParserErrors() { console_bridge::restorePreviousOutputHandler(); }
+  ~ParserErrors() {
+    console_bridge::setLogLevel(handler_.former_level);
+    console_bridge::useOutputHandler(before_);
+    console_bridge::useOutputHandler(handler_.former);
+    handler_.thread = {};
+  }
   ParserErrors(const ParserErrors&) = delete;
   ParserErrors& operator=(const ParserErrors&) = delete;
 
   const std::string& text() const { return handler_.text; }
 
  private:
-  struct Handler : console_bridge::OutputHandler {
-    void log(const std::string& message, console_bridge::LogLevel level, const char*,
-             int) override {
-      if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR) return;
-      text += (text.empty() ? "" : "; ") + message;
-    }
-    std::string text;
-  };
+  static std::unique_lock<std::mutex> lockOutput() {
+    [[maybe_unused]] static const int registered =
+        pthread_atfork([] { mutex_.lock(); }, [] { mutex_.unlock(); }, [] { mutex_.unlock(); });
+    return std::unique_lock<std::mutex>(mutex_);
+  }
 
-  // Of the process too: the parser keeps a pointer to it after it was replaced.
-  static inline Handler handler_;
+  static inline Handler handler_;  // as long as the process, for who has asked for it meanwhile
   static inline std::mutex mutex_;
-  std::lock_guard<std::mutex> lock_;
+  std::unique_lock<std::mutex> lock_;
+  console_bridge::OutputHandler* before_;
 };
 
 // The file's content. Reading it here, not in the parser, tells a missing file from a bad one.

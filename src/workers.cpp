@@ -7,6 +7,7 @@
 #include <atomic>
 #include <exception>
 #include <new>
+#include <stdexcept>
 #include <system_error>
 
 namespace dynacom::internal {
@@ -111,6 +112,8 @@ void Workers::forEach(Eigen::Index count, const std::function<Work()>& makeWork,
   }
   pool.changed.notify_all();
   loop.work(true);
+  if (isForked())  // since it began, and the other threads' items will never be done here
+    throw std::runtime_error("the process was forked within a loop, whose other threads it lacks");
   {
     std::unique_lock<std::mutex> lock(pool.mutex);
     // Those that are still in it may have begun loops of their own, where there is something to do.

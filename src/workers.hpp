@@ -34,7 +34,8 @@ class Workers {
   /// @param progress  called in the caller's thread with the number of items done, which increases
   ///                  up to all of them, if there is such a function
   /// @throws whatever these functions have thrown, after all threads have left the loop; of several
-  ///         exceptions, that of the first item
+  ///         exceptions, that of the first item. std::runtime_error in a process that one of them
+  ///         has forked, and that comes back from it
   void forEach(Eigen::Index count, const std::function<Work()>& makeWork,
                const std::function<void(Eigen::Index)>& progress = nullptr);
 

@@ -253,61 +253,74 @@ struct WrenchDistribution::Workspace {
 
 WrenchDistribution::WrenchDistribution() : work_(std::make_unique<Workspace>()) {}
 WrenchDistribution::WrenchDistribution(const WrenchDistribution& other)
-    : work_(std::make_unique<Workspace>(*other.work_)) {
+    : work_(std::make_unique<Workspace>(other.look())) {
   work_->reserve();  // which copying has undone
 }
-WrenchDistribution::WrenchDistribution(WrenchDistribution&& other) noexcept
-    : WrenchDistribution() {  // the other can be used again
-  std::swap(work_, other.work_);
-}
+WrenchDistribution::WrenchDistribution(WrenchDistribution&& other) noexcept = default;
 WrenchDistribution& WrenchDistribution::operator=(WrenchDistribution other) noexcept {
   std::swap(work_, other.work_);
   return *this;
 }
 WrenchDistribution::~WrenchDistribution() = default;
 
+// The workspace, where it was moved away a new one.
+WrenchDistribution::Workspace& WrenchDistribution::use() {
+  if (!work_) work_ = std::make_unique<Workspace>();
+  return *work_;
+}
+
+const WrenchDistribution::Workspace& WrenchDistribution::look() const {
+  if (work_) return *work_;
+  static const Workspace fresh{};
+  return fresh;
+}
+
 void WrenchDistribution::setWrenchWeights(const Vector6& weights) {
   if (!weights.allFinite() || !(weights.array() > 0.).all())
     throwInvalid("wrench weights must be finite and > 0, got ", weights.transpose());
-  if (weights != work_->settings) work_->has_answer = false;
-  work_->settings = weights;
+  Workspace& work = use();
+  if (weights != work.settings) work.has_answer = false;
+  work.settings = weights;
 }
 
-const Vector6& WrenchDistribution::getWrenchWeights() const { return work_->settings; }
+const Vector6& WrenchDistribution::getWrenchWeights() const { return look().settings; }
 
-void WrenchDistribution::setWarmStart(bool warmStart) { work_->warm_start = warmStart; }
+void WrenchDistribution::setWarmStart(bool warmStart) { use().warm_start = warmStart; }
 
-bool WrenchDistribution::getWarmStart() const { return work_->warm_start; }
+bool WrenchDistribution::getWarmStart() const { return look().warm_start; }
 
 void WrenchDistribution::setMaximalIterations(int maximalIterations) {
   if (maximalIterations <= 0)
     throwInvalid("maximalIterations must be > 0, got ", maximalIterations);
-  work_->maximal_iterations = maximalIterations;
+  use().maximal_iterations = maximalIterations;
 }
 
-int WrenchDistribution::getMaximalIterations() const { return work_->maximal_iterations; }
+int WrenchDistribution::getMaximalIterations() const { return look().maximal_iterations; }
 
 void WrenchDistribution::clear() {
-  work_->added.clear();
-  ++work_->problem_number;
+  Workspace& work = use();
+  work.added.clear();
+  ++work.problem_number;
 }
 
 void WrenchDistribution::reset() {
-  auto fresh = std::make_unique<Workspace>();
-  fresh->settings = work_->settings;
-  fresh->warm_start = work_->warm_start;
-  fresh->maximal_iterations = work_->maximal_iterations;
-  work_ = std::move(fresh);
+  Workspace& work = use();
+  Workspace fresh;
+  fresh.settings = work.settings;
+  fresh.warm_start = work.warm_start;
+  fresh.maximal_iterations = work.maximal_iterations;
+  work = std::move(fresh);  // in place, because others may refer to the result
 }
 
 void WrenchDistribution::forgetAnswers() {
-  work_->newton.forget();
-  work_->has_answer = false;
+  Workspace& work = use();
+  work.newton.forget();
+  work.has_answer = false;
 }
 
-void WrenchDistribution::forgetForces() { work_->has_answer = false; }
+void WrenchDistribution::forgetForces() { use().has_answer = false; }
 
-const DistributionResult& WrenchDistribution::result() const { return work_->result; }
+const DistributionResult& WrenchDistribution::result() const { return look().result; }
 
 WrenchDistribution::Workspace::Slot& WrenchDistribution::Workspace::findSlot(std::size_t slot) {
   if (slot > slots.size())
@@ -370,21 +383,22 @@ void WrenchDistribution::Workspace::reserve() {
 
 void WrenchDistribution::reserve(const ContactBase& contact, std::size_t slot) {
   requireInitialised(contact);
-  Workspace::Slot& found = work_->findSlot(slot);
-  if (found.problem_number == work_->problem_number)
-    throwInvalid("slot ", slot, " is taken already");
-  work_->describe(found, contact);
+  Workspace& work = use();
+  Workspace::Slot& found = work.findSlot(slot);
+  if (found.problem_number == work.problem_number) throwInvalid("slot ", slot, " is taken already");
+  work.describe(found, contact);
 }
 
-void WrenchDistribution::add(const ContactBase& contact) { add(contact, work_->added.size()); }
+void WrenchDistribution::add(const ContactBase& contact) { add(contact, use().added.size()); }
 
 void WrenchDistribution::add(const ContactBase& contact, std::size_t slot) {
   requireInitialised(contact);
   if (contact.ne_A().isZero(0.))
     throw NotReadyError("contact '" + contact.getFrameName() +
                         "' is used before updateNewtonEuler()");
-  Workspace::Slot& taken = work_->takeSlot(slot);
-  work_->describe(taken, contact);
+  Workspace& work = use();
+  Workspace::Slot& taken = work.takeSlot(slot);
+  work.describe(taken, contact);
   taken.NE = contact.ne_A();
   taken.moved = true;
 }
@@ -398,9 +412,10 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
   if (!A.allFinite()) throwInvalid("A must be finite");
   if (!weights.allFinite() || !(weights.array() > 0.).all())
     throwInvalid("weights must be finite and > 0, got ", weights.transpose());
-  Workspace::Slot& taken = work_->takeSlot(work_->added.size());
+  Workspace& work = use();
+  Workspace::Slot& taken = work.takeSlot(work.added.size());
   const Eigen::MatrixXd no_friction(0, A.cols());
-  work_->describe(taken, A, no_friction, weights);
+  work.describe(taken, A, no_friction, weights);
   taken.NE = NE;
   taken.moved = true;
 }
@@ -534,7 +549,7 @@ void WrenchDistribution::Workspace::sumUp() {
 DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minimalScale) {
   if (std::isfinite(minimalScale) && minimalScale < 0.)
     throwInvalid("minimalScale must be >= 0 N, got ", minimalScale);
-  Workspace& work = *work_;
+  Workspace& work = use();
   DistributionResult& result = work.result;
   result.wrench = wrench;
   result.iterations = 0;
@@ -612,7 +627,7 @@ double WrenchDistribution::Workspace::findBoundary(const Vector6& wrench, const 
 }
 
 WrenchMargin WrenchDistribution::computeMargin() {
-  Workspace& work = *work_;
+  Workspace& work = use();
   const DistributionResult& result = work.result;
   WrenchMargin margin;
   if (std::isnan(result.scale) || result.status == DistributionStatus::InvalidInput ||

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <functional>
 #include <new>
+#include <optional>
 #include <utility>
 
 #include "asked_solvers.hpp"
@@ -554,6 +555,21 @@ BOOST_AUTO_TEST_CASE(a_distribution_of_the_same_sizes_allocates_nothing) {
 }
 
 // --- Kept storage ----------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(moving_a_distribution_allocates_nothing) {
+  Random random(9);
+  WrenchDistribution distribution, other;
+  for (const std::string frame : {"left", "right"}) {
+    const auto sole = makeSole(frame);
+    sole->updateNewtonEuler(random.vector3(), random.placement());
+    distribution.add(*sole);
+  }
+  distribution.solve(random.vector(6, 100.));
+  const VectorXd forces = distribution.result().forces();
+  std::optional<WrenchDistribution> moved;
+  BOOST_TEST(allocationsIn([&] { moved.emplace(std::move(distribution)); }) == 0);
+  BOOST_TEST(close(moved->result().forces(), forces, 0.));
+}
 
 BOOST_AUTO_TEST_CASE(kept_storage_allocates_only_to_become_larger_than_ever) {
   using dynacom::internal::Kept;

@@ -353,8 +353,10 @@ BOOST_AUTO_TEST_CASE(divergent_component_of_motion_by_hand) {
 }
 
 BOOST_AUTO_TEST_CASE(virtual_repellent_point_wants_a_positive_omega) {
-  for (const auto& [omega, text] :
-       {std::pair<double, const char*>(0., "0"), {-0.25, "-0.25"}, {kNaN, "nan"}}) {
+  for (const auto& [omega, text] : {std::pair<double, const char*>(0., "0"),
+                                    {-0.25, "-0.25"},
+                                    {kNaN, "nan"},
+                                    {std::numeric_limits<double>::infinity(), "inf"}}) {
     BOOST_TEST(throws<std::invalid_argument>([&, w = omega] { computeVRP(someState(), w); },
                                              {"omega", text}));
     BOOST_TEST(throws<std::invalid_argument>([&, w = omega] { computeDCM(someState(), w); },

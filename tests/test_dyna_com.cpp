@@ -2904,6 +2904,144 @@ BOOST_AUTO_TEST_CASE(a_move_keeps_the_contacts) {
   BOOST_TEST(moved.getContact("left") == biped.left);
 }
 
+BOOST_AUTO_TEST_CASE(what_was_moved_from_waits_for_a_robot) {
+  Biped biped(66);
+  biped.dynacom.setWarmStart(false);
+  compute(biped.dynacom, biped.moving(), Vector6::Zero(), false);
+  const State x = biped.moving();
+  DynaCoM moved = std::move(biped.dynacom), assigned;
+  DynaCoM& husk = biped.dynacom;
+  for (const bool again : {false, true}) {
+    if (again) assigned = std::move(moved);
+    for (DynaCoM* dynacom : again ? std::vector{&husk, &moved} : std::vector{&husk}) {
+      BOOST_TEST(!dynacom->isInitialized());
+      BOOST_TEST(dynacom->getMass() == 0.);
+      BOOST_TEST(dynacom->getKnownContacts().empty());
+      BOOST_TEST(dynacom->allForces().size() == 0);
+      BOOST_TEST(dynacom->getDistributionStatus() == DistributionStatus::NoContact);
+      BOOST_TEST(dynacom->getWarmStart());
+      BOOST_TEST(throws<NotReadyError>([&] { compute(*dynacom, x); }, {"initialize"}));
+      BOOST_TEST(throws<NotReadyError>([&] { distribute(*dynacom); }, {"initialize"}));
+      BOOST_TEST(throws<NotReadyError>([&] { dynacom->addContact(makeSole("sole0"), "sole"); },
+                                       {"initialize"}));
+    }
+  }
+  BOOST_TEST(assigned.isInitialized());
+  BOOST_TEST(!assigned.getWarmStart());
+  BOOST_TEST(assigned.getContact("left") == biped.left);
+}
+
+BOOST_AUTO_TEST_CASE(a_contact_stays_the_one_that_was_asked_for) {
+  Biped biped(67);
+  const auto& left = biped.dynacom.getContact("left");
+  const auto& right = biped.dynacom.getContact("right");
+  biped.dynacom.deactivateContact("left");
+  biped.dynacom.activateContact("left");
+  biped.dynacom.deactivateContact("right");
+  BOOST_TEST(left == biped.left);
+  BOOST_TEST(right == biped.right);
+  biped.dynacom.removeContact("left");
+  BOOST_TEST(left == biped.left);
+}
+
+BOOST_AUTO_TEST_CASE(a_contact_serves_one_robot_at_a_time) {
+  Biped biped(68);
+  DynaCoM other(biped.model);
+  const auto expectTaken = [&] {
+    BOOST_TEST(throws<std::invalid_argument>([&] { other.addContact(biped.left, "foot"); },
+                                             {"foot", "another DynaCoM"}));
+    BOOST_TEST(other.getKnownContacts().empty());
+  };
+  const auto expectFree = [&] {
+    BOOST_CHECK_NO_THROW(other.addContact(biped.left, "foot"));
+    other.removeContact("foot");
+  };
+  expectTaken();
+  // Where it is inactive, moves with its robot, is initialised again, or assigned to, too.
+  biped.dynacom.deactivateContact("left");
+  expectTaken();
+  DynaCoM moved = std::move(biped.dynacom);
+  expectTaken();
+  biped.left->initialize(biped.left->getSettings());
+  expectTaken();
+  const Contact6D copy = *biped.left;
+  *biped.left = *makeSole("sole0");
+  expectTaken();
+  // Copies of it are free, and those that copies of its robot have are not.
+  BOOST_CHECK_NO_THROW(other.addContact(std::make_shared<Contact6D>(copy), "foot"));
+  DynaCoM copied = moved, assigned;
+  assigned = copied;
+  for (const DynaCoM* robot : {&copied, &assigned})
+    BOOST_TEST(throws<std::invalid_argument>(
+        [&] { other.addContact(robot->getContact("left"), "hand"); }, {"another"}));
+  const auto old = assigned.getContact("left");
+  assigned = moved;
+  BOOST_CHECK_NO_THROW(other.addContact(old, "hand"));
+  other.initialize(biped.model);
+  // It is free when its robot has removed it, knows another robot, or is gone.
+  moved.removeContact("left");
+  expectFree();
+  moved.addContact(biped.left, "left");
+  expectTaken();
+  moved.initialize(biped.model);
+  expectFree();
+  {
+    DynaCoM short_lived(biped.model);
+    short_lived.addContact(biped.left, "left");
+    expectTaken();
+  }
+  expectFree();
+  // A contact that was refused is no less free.
+  BOOST_CHECK_THROW(other.addContact(makeSole("no frame"), "foot"), std::invalid_argument);
+  auto lost = makeSole("no frame");
+  BOOST_CHECK_THROW(other.addContact(lost, "foot"), std::invalid_argument);
+  lost->initialize(biped.left->getSettings());
+  BOOST_CHECK_NO_THROW(other.addContact(lost, "foot"));
+}
+
+BOOST_AUTO_TEST_CASE(what_was_never_initialised_has_no_force_to_ask_for) {
+  Biped biped(69);
+  compute(biped.dynacom, restState(biped.model));
+  distribute(biped.dynacom);
+  *biped.left = Contact6D();
+  BOOST_TEST(allNaN(biped.dynacom.getContactCoP("left")));
+  BOOST_TEST(std::isnan(biped.dynacom.getContactCoPMargin("left")));
+  BOOST_TEST(std::isnan(biped.dynacom.getContactFrictionUsage("left")));
+  BOOST_TEST(std::isnan(biped.dynacom.getContactYawUsage("left")));
+  BOOST_TEST(biped.dynacom.allForces().size() == 6);
+  BOOST_TEST(throws<std::invalid_argument>([&] { distribute(biped.dynacom); }, {"left", "frame"}));
+  *biped.left = *makeSole("sole0");
+  BOOST_TEST(distribute(biped.dynacom) == DistributionStatus::Solved);
+}
+
+BOOST_AUTO_TEST_CASE(a_quaternion_that_is_none_is_a_motion_of_which_nothing_is_known) {
+  Biped biped(70);
+  DynaCoM& dynacom = biped.dynacom;
+  const State good = biped.moving();
+  compute(dynacom, good, Vector6::Zero(), false);
+  const VectorXd forces = dynacom.allForces();
+  for (const double factor : {0., 0.99, 1.01, -2.}) {
+    for (const bool flat : {true, false}) {
+      State x = good;
+      x.q.segment<4>(3) *= factor;
+      compute(dynacom, x, Vector6::Zero(), flat);
+      BOOST_TEST(motionIsUnknown(dynacom));
+      // Nor is it known where contacts are: what is asked of them next is not answered either.
+      BOOST_TEST(distribute(dynacom, Vector6::Constant(1.), Vector3d::Zero()) ==
+                 DistributionStatus::InvalidInput);
+      BOOST_TEST(close(dynacom.allForces(), forces, 1e-9));
+      dynacom.computeNL(3., x.q, x.v, x.a, Vector6::Zero(), flat);
+      BOOST_TEST(motionIsUnknown(dynacom));
+      compute(dynacom, good, Vector6::Zero(), flat);
+      BOOST_TEST(dynacom.isCoPDefined());
+    }
+  }
+  State x = good;
+  x.q.segment<4>(3) *= 1.0005;  // files are often rounded
+  compute(dynacom, x);
+  BOOST_TEST(dynacom.isCoPDefined());
+}
+
 BOOST_AUTO_TEST_CASE(what_was_moved_from_can_be_used_again) {
   Biped biped(65);
   const DynaCoM moved = std::move(biped.dynacom);

@@ -336,6 +336,9 @@ BOOST_AUTO_TEST_CASE(a_filter_out_of_range_is_refused) {
   refused(50., 0., {"cutoff", "0"});
   refused(50., -1., {"cutoff", "-1"});
   refused(50., nan, {"cutoff", "nan"});
+  refused(100., 1e-17, {"cutoff", "1e-07", "1e-09", "1e-17"});
+  refused(1e308, 1., {"cutoff", "1e+299", "1"});
+  BOOST_TEST(filterConfigurations(model, q, 100., 1.001e-7).allFinite());
   refused(0., 1., {"rate", "0"});
   refused(nan, 1., {"rate", "nan"});
   MatrixXd bad = q;
@@ -352,6 +355,18 @@ BOOST_AUTO_TEST_CASE(a_filter_out_of_range_is_refused) {
                                            {"time", "increase"}));
   // One frame is its own mean.
   BOOST_TEST(close(filterConfigurations(model, q.leftCols(1), 50., 5.), q.leftCols(1), 0.));
+}
+
+BOOST_AUTO_TEST_CASE(derivatives_whose_squares_are_beyond_the_largest_numbers_do_not_fit) {
+  const auto model = spinner();
+  const Index frames = 10;
+  Motion motion{VectorXd::LinSpaced(frames, 0., 1.), restState(model).q.replicate(1, frames),
+                MatrixXd::Zero(model.nv, frames), MatrixXd::Zero(model.nv, frames)};
+  BOOST_TEST(compareDerivatives(model, motion).velocity == 0.);
+  motion.v(0, 3) = motion.v(0, 4) = 1e200;
+  const DerivativeMismatch mismatch = compareDerivatives(model, motion);
+  BOOST_TEST(mismatch.velocity == std::numeric_limits<double>::infinity());
+  BOOST_TEST(mismatch.acceleration == std::numeric_limits<double>::infinity());
 }
 
 BOOST_AUTO_TEST_CASE(derivatives_of_any_integrator_fit_and_others_do_not) {

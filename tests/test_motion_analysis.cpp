@@ -591,6 +591,44 @@ BOOST_AUTO_TEST_CASE(quaternions_that_are_nearly_normalized_are_taken_as_they_ar
     }
 }
 
+BOOST_AUTO_TEST_CASE(a_frame_with_a_quaternion_that_is_none_is_unknown) {
+  Walk walk(17);
+  const auto whole = analyzeMotion(walk.robot, walk.motion, walk.schedule);
+  walk.motion.q.col(8).segment<4>(3).setZero();
+  walk.motion.q.col(21).segment<4>(3) *= 1.1;
+  for (const int lanes : {kMaximalLanes, 1}) {
+    AnalysisSettings settings;
+    settings.lanes = lanes;
+    settings.omega = whole.omega;
+    const auto analysis = analyzeMotion(walk.robot, walk.motion, walk.schedule, settings);
+    const auto others = numbersOf(whole);
+    for (Index frame = 0; frame < 40; ++frame) {
+      const bool known = frame != 8 && frame != 21;
+      const auto status = static_cast<std::size_t>(frame);
+      BOOST_TEST(analysis.status[status] ==
+                 (known ? whole.status[status] : DistributionStatus::InvalidInput));
+      for (const auto& [name, values] : numbersOf(analysis)) BOOST_TEST_CONTEXT(name) {
+          if (known)
+            BOOST_TEST(sameOrNaN(values.col(frame), others.at(name).col(frame), 1e-6));
+          else if (name.find(' ') == name.npos)  // none of a contact's
+            BOOST_TEST(allNaN(values.col(frame)));
+        }
+    }
+    // As DynaCoM has it.
+    DynaCoM robot = walk.robot;
+    robot.computeDynamics(walk.motion.q.col(8), walk.motion.v.col(8), walk.motion.a.col(8),
+                          Vector6::Zero(), false);
+    BOOST_TEST(robot.getDistributionStatus() == DistributionStatus::InvalidInput);
+  }
+  // The pendulum's frequency is that of the frames that are known.
+  const auto analysis = analyzeMotion(walk.robot, walk.motion, walk.schedule);
+  BOOST_TEST(close(analysis.omega, whole.omega, 0.01));
+  // All else is wrong as before, whatever comes first.
+  walk.motion.v(1, 30) = kNaN;
+  BOOST_TEST(throws<std::invalid_argument>(
+      [&] { analyzeMotion(walk.robot, walk.motion, walk.schedule); }, {"v", "30"}));
+}
+
 BOOST_AUTO_TEST_CASE(numbers_of_threads_and_lanes_out_of_range_are_refused) {
   const Walk walk(16);
   AnalysisSettings settings;

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #define BOOST_TEST_MODULE motion_examination
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <thread>
@@ -364,6 +369,70 @@ BOOST_AUTO_TEST_CASE(threads_may_share_an_examiner) {
   for (std::thread& thread : threads) thread.join();
   for (std::size_t k = 0; k < found.size(); ++k)
     BOOST_TEST(sameBits(found[k], numbersOf(examineMotion(clips.robot, clips.make(k)))));
+}
+
+BOOST_AUTO_TEST_CASE(progress_is_told_by_one_thread_at_a_time) {
+  const Clips clips;
+  std::atomic<int> inside{0}, told{0};
+  std::atomic<bool> alone{true};
+  ExaminationSettings settings;
+  settings.progress = [&](double) {
+    if (++inside > 1) alone = false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    --inside;
+    ++told;
+  };
+  const MotionExaminer examiner(clips.robot, settings);
+  std::vector<std::thread> threads;
+  for (std::size_t k = 0; k < 4; ++k)
+    threads.emplace_back([&, k] { examiner.examine(clips.make(k)); });
+  for (std::thread& thread : threads) thread.join();
+  BOOST_TEST(alone);
+  BOOST_TEST(told >= 4);
+}
+
+BOOST_AUTO_TEST_CASE(who_is_told_of_progress_may_examine_too) {
+  const Clips clips;
+  std::optional<MotionExaminer> examiner;
+  int depth = 0, inner = 0;
+  ExaminationSettings settings;
+  settings.progress = [&](double) {
+    if (++depth == 1 && inner == 0) {
+      examiner->examine(clips.make(1));
+      ++inner;
+    }
+    --depth;
+  };
+  examiner.emplace(clips.robot, settings);
+  BOOST_TEST(sameBits(numbersOf(examiner->examine(clips.make(0))),
+                      numbersOf(examineMotion(clips.robot, clips.make(0)))));
+  BOOST_TEST(inner == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_process_that_was_forked_while_a_thread_examines_examines_too) {
+  const Clips clips;
+  ExaminationSettings settings;
+  settings.analysis.threads = 2;
+  settings.progress = [](double) {};
+  const MotionExaminer examiner(clips.robot, settings);
+  const std::vector<double> expected = numbersOf(examiner.examine(clips.make(0)));
+  std::atomic<bool> ends{false};
+  std::thread other([&] {
+    while (!ends) examiner.examine(clips.make(1));
+  });
+  int failed = 0;
+  for (int trial = 0; trial < 10 && failed == 0; ++trial) {
+    const pid_t child = fork();
+    if (child == 0) {
+      alarm(60);
+      _exit(sameBits(numbersOf(examiner.examine(clips.make(0))), expected) ? 0 : 1);
+    }
+    int status = -1;
+    if (waitpid(child, &status, 0) != child || status != 0) ++failed;
+  }
+  ends = true;
+  other.join();
+  BOOST_TEST(failed == 0);
 }
 
 BOOST_AUTO_TEST_CASE(many_motions_are_each_what_they_are_alone) {

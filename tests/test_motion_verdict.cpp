@@ -553,6 +553,34 @@ BOOST_AUTO_TEST_CASE(what_is_close_to_a_feasible_motion_is_repairable) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(what_is_not_a_number_is_a_fault) {
+  const Stand stand;
+  const auto contacts = computeContactMotions(stand.robot, stand.motion);
+  const auto expectFault = [&](const auto& change, MotionFault fault) {
+    auto changed = contacts;
+    change(changed[1]);
+    const MotionVerdict verdict =
+        judgeMotion(stand.robot, stand.motion, stand.recorded, changed, stand.ground,
+                    analyzeMotion(stand.robot, stand.motion, stand.schedule));
+    BOOST_TEST(!verdict.isFeasible());
+    BOOST_TEST(verdict[fault].frames == 20);
+    BOOST_TEST(verdict[fault].worst == std::numeric_limits<double>::infinity());
+    BOOST_TEST(verdict[fault].subject == "sole1");
+  };
+  expectFault([](auto& contact) { contact.height.segment(30, 20).setConstant(kNaN); },
+              MotionFault::GroundPenetration);
+  expectFault([](auto& contact) { contact.velocity.middleCols(30, 20).setConstant(kNaN); },
+              MotionFault::FootSliding);
+  expectFault([](auto& contact) { contact.rotation.middleCols(30, 20).setConstant(kNaN); },
+              MotionFault::DownwardNormal);
+  // But there may be no ground.
+  auto changed = contacts;
+  changed[1].height.setConstant(kNaN);
+  BOOST_TEST(judgeMotion(stand.robot, stand.motion, stand.recorded, changed, Vector2d(0., kNaN),
+                         analyzeMotion(stand.robot, stand.motion, stand.schedule))
+                 .isFeasible());
+}
+
 BOOST_AUTO_TEST_CASE(severity_is_the_largest_share_of_what_holds) {
   MotionVerdict verdict = {};
   verdict.unsure.setConstant(20, false);
@@ -590,6 +618,9 @@ BOOST_AUTO_TEST_CASE(codes_settings_and_sizes) {
   refused([](auto& s) { s.settings.repairable_largest_distance = kNaN; },
           {"VerdictSettings.repairable_largest_distance", "nan"});
   refused([](auto& s) { s.recorded.q.conservativeResize(7, 99); }, {"recorded.q", "100", "99"});
+  refused([](auto& s) { s.recorded.q(1, 50) = kNaN; }, {"recorded.q", "finite", "50"});
+  refused([](auto& s) { s.recorded.q.col(50).tail(4).setZero(); },
+          {"recorded.q", "quaternions", "50"});
   refused([](auto& s) { s.ground.resize(1, 1); }, {"ground", "2", "1"});
   refused([](auto& s) { s.ground.setZero(2, 99); }, {"ground", "100", "99"});
   refused([](auto& s) { s.unsure.setConstant(3, false); }, {"unsure", "100", "3"});

@@ -281,6 +281,19 @@ BOOST_AUTO_TEST_CASE(a_single_frame_is_at_rest) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(what_is_beyond_the_largest_numbers_is_not_exact) {
+  Record record;
+  // Frames that follow each other faster than they could be counted.
+  for (const double step : {1e-300, 1e-15}) {
+    record.recorded.time = VectorXd::LinSpaced(201, 0., 200. * step);
+    BOOST_CHECK_NO_THROW(deriveMotion(record.model, record.recorded, 0.));
+  }
+  record.recorded.time = VectorXd::LinSpaced(201, 0., 2.);
+  for (Index frame = 0; frame < 201; ++frame)
+    record.recorded.q(0, frame) = frame % 2 == 0 ? 1.7e308 : -1.7e308;
+  BOOST_TEST(!deriveMotion(record.model, record.recorded, 0.).isExact());
+}
+
 BOOST_AUTO_TEST_CASE(what_cannot_be_derived_is_refused) {
   const auto refused = [](const auto& change, double cutoff,
                           std::initializer_list<std::string> parts) {

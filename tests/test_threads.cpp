@@ -2,6 +2,10 @@
 // A thread takes a copy of a DynaCoM, and shares nothing. `scripts/test --sanitize` runs this with
 // ThreadSanitizer, too.
 #define BOOST_TEST_MODULE threads
+#include <console_bridge/console.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <cstring>
 #include <functional>
@@ -255,12 +259,121 @@ BOOST_AUTO_TEST_CASE(contacts_and_verdicts_are_the_same_whatever_the_number_of_t
   for (const int threads : {2, 3, 8}) BOOST_TEST(sameBits(judge(threads), serial));
 }
 
-BOOST_AUTO_TEST_CASE(threads_may_read_robots_at_once) {
-  // The parser has one output for the whole process, so that this is less obvious than it looks.
-  DynaCoMSettings good, bad;
-  good.urdf =
+namespace {
+
+DynaCoMSettings makeBall() {
+  DynaCoMSettings settings;
+  settings.urdf =
       R"(<robot name="ball"><link name="ball"><inertial><mass value="2.5"/><inertia
       ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link></robot>)";
+  return settings;
+}
+
+/// Counts what is printed by the parser's means.
+struct Counter : console_bridge::OutputHandler {
+  void log(const std::string&, console_bridge::LogLevel, const char*, int) override { ++messages; }
+  std::atomic<int> messages{0};
+};
+
+/// Counters in the place of the process's output, for as long as this lives.
+struct Output {
+  Output() {
+    console_bridge::useOutputHandler(&before);
+    console_bridge::useOutputHandler(&present);
+  }
+  ~Output() {
+    console_bridge::useOutputHandler(former);
+    console_bridge::useOutputHandler(former);
+  }
+  console_bridge::OutputHandler* const former = console_bridge::getOutputHandler();
+  Counter before, present;
+};
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(the_output_of_others_is_theirs_while_robots_are_read) {
+  Output output;
+  DynaCoMSettings good = makeBall();  // with so many links that reading takes its time
+  std::string links;
+  for (int k = 0; k < 300; ++k) {
+    const std::string name = "link" + std::to_string(k);
+    links += "<link name='" + name + "'/><joint name='to_" + name +
+             "' type='fixed'><parent link='ball'/><child link='" + name + "'/></joint>";
+  }
+  good.urdf.insert(good.urdf.find("</robot>"), links);
+  std::atomic<bool> ends{false};
+  std::atomic<int> printed{0};
+  std::thread other([&] {
+    while (!ends) {
+      CONSOLE_BRIDGE_logError("something else is wrong");
+      ++printed;
+    }
+  });
+  while (printed == 0) std::this_thread::yield();
+  int refused = 0;
+  for (int repetition = 0; repetition < 20; ++repetition) {
+    try {
+      DynaCoM robot(good);
+    } catch (const std::invalid_argument&) {
+      ++refused;
+    }
+  }
+  ends = true;
+  other.join();
+  BOOST_TEST(refused == 0);
+  BOOST_TEST(output.present.messages + output.before.messages == printed);
+}
+
+BOOST_AUTO_TEST_CASE(the_output_is_what_it_was_after_a_robot_was_read) {
+  Output output;
+  const auto level = console_bridge::getLogLevel();
+  DynaCoMSettings good = makeBall(), bad = good;
+  bad.urdf = good.urdf.substr(0, 60);
+  for (const bool is_good : {true, false}) {
+    try {
+      DynaCoM robot(is_good ? good : bad);
+    } catch (const std::invalid_argument&) {
+      BOOST_TEST(!is_good);
+    }
+    BOOST_TEST(console_bridge::getOutputHandler() == &output.present);
+    console_bridge::restorePreviousOutputHandler();
+    BOOST_TEST(console_bridge::getOutputHandler() == &output.before);
+    console_bridge::restorePreviousOutputHandler();
+  }
+  BOOST_TEST(output.present.messages == 0);
+  // Nor does it matter whether anything is printed at all.
+  console_bridge::setLogLevel(console_bridge::CONSOLE_BRIDGE_LOG_NONE);
+  bad.urdf = good.urdf;
+  bad.urdf.replace(bad.urdf.find("2.5"), 3, "two");
+  BOOST_CHECK_THROW(DynaCoM{bad}, std::invalid_argument);
+  BOOST_TEST(console_bridge::getLogLevel() == console_bridge::CONSOLE_BRIDGE_LOG_NONE);
+  console_bridge::setLogLevel(level);
+}
+
+BOOST_AUTO_TEST_CASE(a_process_that_was_forked_while_a_robot_is_read_reads_robots) {
+  const DynaCoMSettings good = makeBall();
+  std::atomic<bool> ends{false};
+  std::thread other([&] {
+    while (!ends) DynaCoM robot(good);
+  });
+  int failed = 0;
+  for (int trial = 0; trial < 30 && failed == 0; ++trial) {
+    const pid_t child = fork();
+    if (child == 0) {
+      alarm(20);
+      _exit(DynaCoM(good).getMass() == 2.5 ? 0 : 1);
+    }
+    int status = -1;
+    if (waitpid(child, &status, 0) != child || status != 0) ++failed;
+  }
+  ends = true;
+  other.join();
+  BOOST_TEST(failed == 0);
+}
+
+BOOST_AUTO_TEST_CASE(threads_may_read_robots_at_once) {
+  // The parser has one output for the whole process, so that this is less obvious than it looks.
+  DynaCoMSettings good = makeBall(), bad;
   bad.urdf = R"(<robot name="ball"><link name="ball"><inertial>)";
   std::vector<double> masses(kThreads);
   std::vector<int> refused(kThreads);

@@ -14,11 +14,13 @@
 #include <thread>
 #include <vector>
 
+#include "pool.hpp"
 #include "workers.hpp"
 
 using dynacom::internal::BlockWork;
 using dynacom::internal::forEachBlock;
 using dynacom::internal::kBlockFrames;
+using dynacom::internal::Pool;
 using dynacom::internal::Workers;
 using Eigen::Index;
 
@@ -213,6 +215,66 @@ BOOST_AUTO_TEST_CASE(a_process_that_was_forked_does_all_by_itself) {
   BOOST_TEST(status == 0);
   work();
   BOOST_TEST(done == 100);
+}
+
+BOOST_AUTO_TEST_CASE(a_process_that_comes_back_from_a_loop_in_which_it_was_forked_is_told) {
+  Workers workers(2);
+  std::atomic<int> others{0};  // that wait in the loop
+  std::atomic<pid_t> child{-1};
+  const auto caller = std::this_thread::get_id();
+  const auto forks = [&](Index) {
+    if (child >= 0) return;
+    waitFor([&] { return others > 0; });
+    child = fork();
+    if (child == 0) alarm(20);
+  };
+  bool is_told = false;
+  try {
+    workers.forEach(
+        50,
+        [&]() -> Workers::Work {
+          return [&](Index) {
+            if (std::this_thread::get_id() == caller) return;
+            ++others;
+            waitFor([&] { return child >= 0; });
+          };
+        },
+        forks);
+  } catch (const std::runtime_error&) {
+    is_told = true;
+  }
+  if (child == 0) _exit(is_told ? 0 : 1);
+  BOOST_TEST(!is_told);
+  int status = -1;
+  BOOST_REQUIRE(waitpid(child, &status, 0) == child);
+  BOOST_TEST(status == 0);
+}
+
+BOOST_AUTO_TEST_CASE(a_pool_is_free_in_a_process_that_was_forked_while_another_thread_takes_of_it) {
+  std::atomic<int> made{0};
+  Pool<int> pool([&] { return std::make_unique<int>(++made); });
+  auto mine = pool.take();
+  std::atomic<bool> ends{false};
+  std::thread other([&] {
+    while (!ends) pool.take();
+  });
+  int failed = 0;
+  for (int trial = 0; trial < 300 && failed == 0; ++trial) {
+    const pid_t child = fork();
+    if (child == 0) {
+      alarm(20);
+      const int number = *mine;
+      mine.reset();  // which does not give it back: it is of the other process
+      _exit(*pool.take() != number ? 0 : 1);
+    }
+    int status = -1;
+    if (waitpid(child, &status, 0) != child || status != 0) ++failed;
+  }
+  ends = true;
+  other.join();
+  BOOST_TEST(failed == 0);
+  // In the process itself they are used again.
+  BOOST_TEST(made == 2);
 }
 
 BOOST_AUTO_TEST_CASE(blocks_are_the_same_whatever_the_number_of_threads) {

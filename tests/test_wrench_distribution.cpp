@@ -1765,6 +1765,47 @@ BOOST_AUTO_TEST_CASE(a_copy_is_independent) {
   BOOST_TEST(close(moved.result().forces()[2], 100., 1e-10));
 }
 
+BOOST_AUTO_TEST_CASE(what_was_moved_from_is_as_new) {
+  WrenchDistribution original;
+  original.setWrenchWeights(Vector6::Constant(2.));
+  original.setWarmStart(false);
+  original.setMaximalIterations(7);
+  for (const auto& contact : twoSoles()) original.add(*contact);
+  original.solve(wrench(0., 0., 500.));
+  WrenchDistribution moved(std::move(original));
+  BOOST_TEST(moved.getMaximalIterations() == 7);
+
+  WrenchDistribution copy(original);
+  for (WrenchDistribution* distribution : {&original, &copy}) {
+    BOOST_TEST(close(distribution->getWrenchWeights(), Vector6::Ones(), 0.));
+    BOOST_TEST(distribution->getWarmStart());
+    BOOST_TEST(distribution->getMaximalIterations() == WrenchDistribution::kMaximalIterations);
+    BOOST_TEST(distribution->result().status == DistributionStatus::NoContact);
+    BOOST_TEST(distribution->result().contacts.empty());
+    BOOST_TEST(std::isnan(distribution->computeMargin().margin));
+    distribution->reset();
+    distribution->forgetForces();
+    distribution->forgetAnswers();
+    distribution->clear();
+    for (const auto& contact : twoSoles()) distribution->add(*contact);
+    BOOST_TEST(distribution->solve(wrench(0., 0., 500.)) == DistributionStatus::Solved);
+  }
+  WrenchDistribution again(std::move(copy));
+  copy = moved;
+  BOOST_TEST(close(copy.result().forces(), moved.result().forces(), 0.));
+}
+
+BOOST_AUTO_TEST_CASE(a_result_stays_where_it_is) {
+  WrenchDistribution distribution;
+  const DistributionResult& result = distribution.result();
+  for (const auto& contact : twoSoles()) distribution.add(*contact);
+  distribution.solve(wrench(0., 0., 500.));
+  BOOST_TEST(result.status == DistributionStatus::Solved);
+  distribution.reset();
+  BOOST_TEST(&distribution.result() == &result);
+  BOOST_TEST(result.status == DistributionStatus::NoContact);
+}
+
 namespace {
 
 /// The margin of a wrench that contacts can give.

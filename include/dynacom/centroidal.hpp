@@ -78,7 +78,7 @@ DYNACOM_EXPORT Eigen::Vector2d computeFlatGroundCoP(
 /// Virtual repellent point on the ground's plane, equation (7): v = c − c̈ / ω² [m]; NaN where that
 /// is beyond the largest numbers.
 /// @param omega  ω > 0, natural frequency of the linear inverted pendulum [rad/s]
-/// @throws std::invalid_argument unless ω > 0
+/// @throws std::invalid_argument unless ω is finite and > 0
 DYNACOM_EXPORT Eigen::Vector2d computeVRP(const CentroidalState& state, double omega);
 
 /// The same in three dimensions: the total force on the robot, gravity's included, is m ω² (c − v).
@@ -99,7 +99,7 @@ DYNACOM_EXPORT Eigen::Vector3d computeECMP(const CentroidalState& state,
 /// Divergent component of motion on the ground's plane, equation (20): ξ = c + ċ / ω [m]; NaN where
 /// that is beyond the largest numbers.
 /// @param omega  ω > 0, natural frequency of the linear inverted pendulum [rad/s]
-/// @throws std::invalid_argument unless ω > 0
+/// @throws std::invalid_argument unless ω is finite and > 0
 DYNACOM_EXPORT Eigen::Vector2d computeDCM(const CentroidalState& state, double omega);
 
 }  // namespace dynacom

@@ -29,7 +29,8 @@ namespace dynacom {
 /// diagonals they allow √2 μ f_z.
 ///
 /// A contact is described by its settings, which the derived classes hold. Until it has them,
-/// cols() is 0.
+/// cols() is 0. It may be one DynaCoM's, of which copies know nothing, and which it stays when it
+/// is assigned to.
 class DYNACOM_EXPORT ContactBase {
  public:
   using SE3 = pinocchio::SE3;
@@ -150,6 +151,17 @@ class DYNACOM_EXPORT ContactBase {
   void reset();
 
  private:
+  friend class DynaCoM;
+
+  // Whether a DynaCoM has this contact, whatever is copied from it or assigned to it.
+  struct Taken {
+    Taken() = default;
+    Taken(const Taken&) {}
+    Taken& operator=(const Taken&) { return *this; }
+
+    bool value = false;
+  };
+
   Eigen::MatrixXd uni_A_, fri_A_;
   Eigen::VectorXd reg_A_;
   std::uint64_t revision_ = 0;
@@ -158,6 +170,7 @@ class DYNACOM_EXPORT ContactBase {
   FrameIndex frame_id_ = kUnknownFrame;
   SE3 pose_ = SE3::Identity();
   Eigen::VectorXd force_;
+  Taken taken_;
 };
 
 }  // namespace dynacom

@@ -15,6 +15,10 @@
 
 namespace dynacom {
 
+namespace internal {
+class ConfigurationCheck;
+}
+
 /// What describes a DynaCoM.
 struct DYNACOM_EXPORT DynaCoMSettings {
   /// The robot: path of a URDF file, or the XML itself. Its root joint will be a free-flyer: its
@@ -37,7 +41,9 @@ DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const DynaCoMSettings
 ///
 /// A DynaCoM owns a model, its data and an ordered list of contacts: the active ones, in the order
 /// of their activation, then the others. Matrices and forces are stacked in that order. Copying a
-/// DynaCoM copies its contacts too, so that a copy can work in another thread.
+/// DynaCoM copies its contacts too, so that a copy can work in another thread. One that was moved
+/// from has no robot and no contacts, and waits for initialize() as a new one does; what it still
+/// says of a motion means nothing.
 ///
 /// Vectors have the sizes of Pinocchio: q has getModel().nq components, v and a have getModel().nv.
 /// Everything is in the world's axes unless another frame is named. Before computeDynamics() all
@@ -72,15 +78,15 @@ class DYNACOM_EXPORT DynaCoM {
   void initialize(const pinocchio::Model& model);
 
   /// Whether there is a robot: false before initialize().
-  bool isInitialized() const { return mass_ > 0.; }
+  bool isInitialized() const { return configuration_check_ != nullptr; }
 
   const DynaCoMSettings& getSettings() const { return settings_; }
   const pinocchio::Model& getModel() const { return model_; }
   const pinocchio::Data& getData() const { return data_; }
   /// One may run Pinocchio's algorithms on it between two calls: contacts are placed by its oMi.
   pinocchio::Data& getData() { return data_; }
-  /// Mass of the robot [kg].
-  double getMass() const { return mass_; }
+  /// Mass of the robot [kg]; 0 before initialize().
+  double getMass() const { return isInitialized() ? mass_ : 0.; }
 
   /// Height of the flat horizontal ground in the world, 0 by default [m].
   double getGroundHeight() const { return ground_height_; }
@@ -126,9 +132,10 @@ class DYNACOM_EXPORT DynaCoM {
   /// with p_k the centre of pressure of contact k and f_k its force. Contacts without load drop
   /// out.
   ///
-  /// If a number is not finite, or becomes so, all results of the motion are NaN; a distribution on
-  /// uneven ground ends as DistributionStatus::InvalidInput. On flat ground there is none: forces
-  /// and getDistribution() stay those of the last one.
+  /// If a number is not finite, or becomes so, or a quaternion's norm is not 1 (up to 1e-3), all
+  /// results of the motion are NaN; a distribution on uneven ground ends as
+  /// DistributionStatus::InvalidInput. On flat ground there is none: forces and getDistribution()
+  /// stay those of the last one.
   /// @param q          configuration, model().nq, its quaternions of norm 1
   /// @param v, a       velocity and acceleration, model().nv
   /// @param extWrench  (force [N], moment [N·m]) on the robot besides the contacts', about the CoM
@@ -201,7 +208,8 @@ class DYNACOM_EXPORT DynaCoM {
   /// (7, 8), of the last computeDynamics(). Where that has distributed the wrench, because the
   /// ground is not flat, c̈ is getFeasibleACoM(), so that p and v are those of one motion.
   /// @param omega  ω > 0 [rad/s]
-  /// @throws std::invalid_argument unless ω > 0; NotReadyError before computeDynamics()
+  /// @throws std::invalid_argument unless ω is finite and > 0; NotReadyError before
+  ///         computeDynamics()
   void computeNL(double omega);
 
   /// computeDynamics() and computeNL(omega).
@@ -220,9 +228,11 @@ class DYNACOM_EXPORT DynaCoM {
 
   /// Makes a contact known under a name, and active unless said otherwise. It is shared, not
   /// copied: settings that change in the caller's hand act on the next call. A contact serves one
-  /// DynaCoM at a time, which sets its frame index, its pose and its force.
+  /// DynaCoM at a time, which sets its frame index, its pose and its force; it is free again once
+  /// it was removed, or that DynaCoM was initialised again or is gone.
   /// @throws std::invalid_argument if the contact is null, was never initialised or is known
-  ///         already, the name is taken, or the model does not have one frame of the contact's name
+  ///         already, here or to another DynaCoM, the name is taken, or the model does not have one
+  ///         frame of the contact's name
   void addContact(const std::shared_ptr<ContactBase>& contact, const std::string& name,
                   bool active = true);
   /// Forgets a contact; its force becomes zero.
@@ -252,7 +262,7 @@ class DYNACOM_EXPORT DynaCoM {
   void resetContactPose(const std::string& name);
 
   /// @throws std::invalid_argument if the name is not known
-  const std::shared_ptr<ContactBase>& getContact(const std::string& name) const;
+  std::shared_ptr<ContactBase> getContact(const std::string& name) const;
   /// Names of the active contacts, in the order of their activation.
   std::vector<std::string> getActiveContacts() const;
   /// Names of all contacts: the active ones as above, then the others.
@@ -319,16 +329,27 @@ class DYNACOM_EXPORT DynaCoM {
   Eigen::VectorXd allForces() const;
 
  private:
-  // A copy has a contact of its own; a move keeps it.
-  struct Entry {
-    Entry(std::string name, std::shared_ptr<ContactBase> contact, std::size_t slot);
-    Entry(const Entry& other);
-    Entry(Entry&&) noexcept = default;
-    Entry& operator=(const Entry& other);
-    Entry& operator=(Entry&&) noexcept = default;
+  // A contact that is this robot's, as long as this lives. A copy has a contact of its own; a move
+  // keeps it.
+  class OwnContact {
+   public:
+    explicit OwnContact(std::shared_ptr<ContactBase> contact);
+    OwnContact(const OwnContact& other);
+    OwnContact(OwnContact&&) noexcept = default;
+    OwnContact& operator=(OwnContact other) noexcept;
+    ~OwnContact();
 
+    const std::shared_ptr<ContactBase>& get() const { return contact_; }
+    ContactBase& operator*() const { return *contact_; }
+    ContactBase* operator->() const { return contact_.get(); }
+
+   private:
+    std::shared_ptr<ContactBase> contact_;
+  };
+
+  struct Entry {
     std::string name;
-    std::shared_ptr<ContactBase> contact;
+    OwnContact contact;
     std::size_t slot;  // of the distribution
     bool active = false;
     bool measured = false;  // placed by setContactPose()
@@ -363,6 +384,7 @@ class DYNACOM_EXPORT DynaCoM {
   DynaCoMSettings settings_;
   pinocchio::Model model_;
   pinocchio::Data data_;
+  std::shared_ptr<const internal::ConfigurationCheck> configuration_check_;  // of the robot
   double mass_ = 0.;
   double ground_height_ = 0.;
   double minimal_vertical_force_ = kMinimalVerticalForce;

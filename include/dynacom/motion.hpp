@@ -27,6 +27,10 @@ struct DYNACOM_EXPORT Motion {
 /// near a half, the filter's frequencies are squeezed together until little is left of it.
 constexpr double kMaximalCutoff = 0.4;
 
+/// The smallest cut-off frequency, as a part of the frame rate: of the coefficients of a lower one
+/// rounding would leave fewer than seven digits.
+constexpr double kMinimalCutoff = 1e-9;
+
 /// Configurations without what is faster than a cut-off frequency: a Butterworth filter of fourth
 /// order, forward and backward, so that nothing is delayed and the gain at the cut-off is ½.
 ///
@@ -38,7 +42,7 @@ constexpr double kMaximalCutoff = 0.4;
 /// half a period of an end can be as wrong as they are large.
 /// @param q       configurations, nq × frames
 /// @param rate    frames per second, evenly spaced [Hz]
-/// @param cutoff  0 < cutoff < kMaximalCutoff rate [Hz]
+/// @param cutoff  from kMinimalCutoff rate to less than kMaximalCutoff rate [Hz]
 /// @return nq × frames
 /// @throws std::invalid_argument unless rate and cutoff are in their ranges, q has nq finite rows,
 ///         and its quaternions have norm 1

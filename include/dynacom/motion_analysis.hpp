@@ -85,9 +85,13 @@ struct MotionAnalysis {
 
 /// Computes dynamics and distribution for every frame of a motion, whose contacts are placed by the
 /// model: a pose that was measured once says nothing of them. The robot given is left as it is.
-/// @throws std::invalid_argument if motion or schedule is not valid, or the schedule names a
-///         contact that the robot does not know; contacts without schedule are never active.
-///         NotReadyError before the robot's initialize()
+/// A frame with a quaternion whose norm is not 1 (up to 1e-3) is as one of
+/// DynaCoM::computeDynamics: its numbers are NaN, and its status is
+/// DistributionStatus::InvalidInput.
+/// @throws std::invalid_argument if the schedule or else of the motion is not valid, or the
+/// schedule
+///         names a contact that the robot does not know; contacts without schedule are never
+///         active. NotReadyError before the robot's initialize()
 DYNACOM_EXPORT MotionAnalysis analyzeMotion(const DynaCoM& robot, const Motion& motion,
                                             const ContactSchedule& schedule,
                                             const AnalysisSettings& settings = AnalysisSettings());

@@ -34,7 +34,8 @@ struct DYNACOM_EXPORT ExaminationSettings {
   /// takes them.
   bool sensitivity = false;
   /// Called now and then, in the caller's thread, with what part of the frames is analysed, which
-  /// increases up to 1.
+  /// increases up to 1. Where several threads examine at once, of several motions, but never by two
+  /// threads at once.
   std::function<void(double)> progress = nullptr;
 
   /// @throws std::invalid_argument naming the first field out of its range

@@ -122,6 +122,8 @@ class DYNACOM_EXPORT WrenchDistribution {
   /// any random problem has taken. For those who can wait; a controller sets less.
   static constexpr int kMaximalIterations = 100000;
 
+  /// One that was moved from is as new; storage, which moving does not take, it gets at its next
+  /// use.
   WrenchDistribution();
   WrenchDistribution(const WrenchDistribution& other);
   WrenchDistribution(WrenchDistribution&&) noexcept;
@@ -209,7 +211,11 @@ class DYNACOM_EXPORT WrenchDistribution {
 
  private:
   struct Workspace;
-  std::unique_ptr<Workspace> work_;
+
+  Workspace& use();
+  const Workspace& look() const;
+
+  std::unique_ptr<Workspace> work_;  // null after a move
 };
 
 }  // namespace dynacom

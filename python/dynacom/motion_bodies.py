@@ -106,7 +106,7 @@ def check_bodies(
         DynacomError: a link is elsewhere.
     """
     error, where = _mismatch(robot, names, angles, bodies)
-    if error > TOLERANCE:
+    if not error <= TOLERANCE:
         raise _wrong_robot(path, robot, f"the file's joints put {where} {error:.2g} m away")
     return [_agreement(error)]
 
@@ -138,7 +138,7 @@ def find_order(
         for order in dict.fromkeys(order for _, order in orders)
     }
     best = min(errors, key=lambda order: errors[order][0])
-    if errors[best][0] > TOLERANCE and (found := _match_columns(robot, angles, bodies)):
+    if not errors[best][0] <= TOLERANCE and (found := _match_columns(robot, angles, bodies)):
         orders.append(("one of its own", found))
         errors[found] = _mismatch(robot, found, angles, bodies)
         best = min(errors, key=lambda order: errors[order][0])
@@ -212,7 +212,7 @@ def carry_points(
         pin.framesForwardKinematics(model, data, before[frame])
         for body, link in links:
             away = data.oMf[link].translation - position[frame, body]
-            if np.linalg.norm(away) > TOLERANCE:
+            if not np.linalg.norm(away) <= TOLERANCE:
                 return None
     joints = _find_links(robot, before, position, names)
     if None in joints:
@@ -355,7 +355,7 @@ def _match_columns(robot: Robot, angles: np.ndarray, bodies: BodySample) -> tupl
         shown = _turn(turned, axes[joint])
         difference = np.abs(_wrap(shown[:, :, None] - angles[:, None, :])).max(axis=0)
         error = error.max(axis=0) + LEVER * difference.min(axis=1)
-        if error.min() > TOLERANCE:
+        if not error.min() <= TOLERANCE:
             return None
         moves = np.abs(_wrap(shown - shown[0])).max(axis=0)
         body = int(np.argmax(np.where(error <= error.min() + _ALIKE, moves, -1.0)))

@@ -73,7 +73,7 @@ class Change:
         if q.shape != clip.q.shape:
             raise DynacomError(f"q must have shape {clip.q.shape}, got {q.shape}")
         error = np.abs(np.linalg.norm(q[:, 3:7], axis=1) - 1.0)
-        if not np.isfinite(q).all() or error.max() > _NORM_ERROR:
+        if not np.isfinite(q).all() or not error.max() <= _NORM_ERROR:
             raise DynacomError("q must hold finite numbers and quaternions of norm 1, got others")
         q = q.copy()
         q[:, 3:7], _, _ = normalize(clip.path, q[:, 3:7])
@@ -242,7 +242,7 @@ class Change:
             step: the largest one from a number to the next that can be written.
         """
         noise = rounding_noise(step, self.rate)
-        if noise > ROUNDING_NOISE:
+        if not noise <= ROUNDING_NOISE:
             self.notes.append(
                 f"The file's numbers are coarse: their rounding makes accelerations of up to "
                 f"{noise:.2g} m/s^2 or rad/s^2."

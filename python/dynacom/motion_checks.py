@@ -2,7 +2,8 @@
 """What a motion file can have wrong, noticed before anything is computed from it.
 
 Frames count from 0. All limits stand here; they are generous, so that what goes beyond is a mistake
-in the file or in how it was read, and no motion.
+in the file or in how it was read, and no motion. Comparisons are such that what is not a number
+counts as beyond them.
 """
 
 from collections.abc import Callable, Sequence
@@ -148,7 +149,7 @@ def normalize(
     """
     norm = np.linalg.norm(quaternion, axis=1)
     error = np.abs(norm - 1.0)
-    if error.max() > QUATERNION_ERROR:
+    if not error.max() <= QUATERNION_ERROR:
         frame = int(np.argmax(error))
         raise DynacomError(
             f"{path}: the root's quaternion must have norm 1, got {norm[frame]:.4g} in frame "

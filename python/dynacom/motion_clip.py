@@ -128,7 +128,7 @@ def clip_from_configurations(
             f"The file does not give {len(held)} of {len(known)} joints, which stay at their "
             f"default: {brief(held)}."
         )
-    if error.max() > QUATERNION_NOTED:
+    if not error.max() <= QUATERNION_NOTED:
         notes.append(
             f"The root's quaternions were normalised: their norms differ from 1 by up to "
             f"{error.max():.1g}."

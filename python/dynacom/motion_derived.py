@@ -87,7 +87,7 @@ def _axis_angles(
         np.concatenate([root[:, None], others], axis=1)
         for root, others in zip(of_root, of_joints, strict=True)
     )
-    if np.abs(old[:, : count + 1] - before).max() > _ALIKE:
+    if not np.abs(old[:, : count + 1] - before).max() <= _ALIKE:
         return None
     return np.concatenate([after, old[:, count + 1 :]], axis=1)
 
@@ -115,7 +115,7 @@ def _joint_velocities(
     columns = [model.joints[model.getJointId(name)].idx_v for name in joints.names]
     before = change.derivatives(change.clip.q, before=True).v[change.rows][:, columns]
     error = np.sqrt(np.mean((old.reshape(before.shape) - before) ** 2))
-    if error > _SAME_VELOCITY * np.sqrt(np.mean(before**2)):
+    if not error <= _SAME_VELOCITY * np.sqrt(np.mean(before**2)):
         return None
     return velocity[:, columns]
 

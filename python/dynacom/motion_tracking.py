@@ -169,7 +169,7 @@ def _changed_bodies(
         if name in arrays:
             values = arrays.numbers(name, *bodies.position.shape).copy()
             error = np.sqrt(np.mean((values[:, moved] - before[..., part]) ** 2))
-            if error > _OTHER_VELOCITY * np.sqrt(np.mean(before[..., part] ** 2)):
+            if not error <= _OTHER_VELOCITY * np.sqrt(np.mean(before[..., part] ** 2)):
                 notes.append(
                     f"What was in {name} was not the velocity of the bodies' frames, as it is now."
                 )
@@ -286,7 +286,7 @@ def _read_bodies(path: Path, robot: Robot, arrays: Arrays, frames: int, order: s
     quaternion = to_xyzw(arrays.numbers("body_quat_w", frames, count, 4), order)
     norm = np.linalg.norm(quaternion, axis=-1)
     error = np.abs(norm - 1.0)
-    if error.max() > QUATERNION_ERROR:
+    if not error.max() <= QUATERNION_ERROR:
         frame, body = np.unravel_index(np.argmax(error), error.shape)
         raise DynacomError(
             f"{path}: body_quat_w must have norm 1, got {norm[frame, body]:.4g} in frame {frame} "

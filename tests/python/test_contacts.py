@@ -788,6 +788,28 @@ def test_numbers_of_numpy(kind):
         settings.mu = np.ones(1)
 
 
+def test_numbers_of_numpy_are_for_functions_of_dynacom_alone():
+    """A process has one registry of converters; Pinocchio's functions take what they took."""
+    for kind in (np.float32, np.int64):
+        with pytest.raises(TypeError):
+            pin.Inertia.FromSphere(kind(2), kind(1))
+    with pytest.raises(TypeError):
+        pin.isNormalized(pin.Model(), np.zeros(0), np.float32(1.0))
+    with pytest.raises(TypeError):
+        pin.JointModelRX().setIndexes(np.int64(1), np.int64(0), np.int64(0))
+
+
+def test_a_user_s_own_attributes_stay_what_they_are():
+    class Own(dynacom.ContactPointSettings):
+        scale = 1.0
+
+    settings = Own()
+    settings.scale = np.float32(0.5)
+    assert type(settings.scale) is np.float32
+    settings.mu = np.float32(0.5)
+    assert settings.mu == 0.5
+
+
 NO_NUMBERS = [
     np.timedelta64(3),
     np.timedelta64(3, "s"),

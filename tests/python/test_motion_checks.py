@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """What files can have wrong, whatever their format."""
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from dynacom import DynacomError, read_motion
+from dynacom.motion_checks import normalize
 from motion_files import assert_notes, refuses, sway, write_columns, write_csv
 
 
@@ -108,6 +111,14 @@ def test_quaternions_far_from_norm_1(check):
         return table
 
     check(scale, "the root's quaternion must have norm 1, got 1.2 in frame 12")
+
+
+def test_what_is_not_a_number_has_no_norm():
+    quaternions = np.tile([0.0, 0.0, 0.0, 1.0], (5, 1))
+    for wrong in (np.nan, np.inf):
+        quaternions[3, 1] = wrong
+        with pytest.raises(DynacomError, match="must have norm 1, got (nan|inf) in frame 3"):
+            normalize(Path("clip.csv"), quaternions)
 
 
 @pytest.mark.parametrize("norm", [0.92, 1.08])
