@@ -1,0 +1,463 @@
+// SPDX-License-Identifier: BSD-2-Clause
+#include "scaled_set.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dynacom::internal {
+
+using Eigen::Index;
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+
+namespace {
+
+constexpr int kNormal = 2, kYaw = 5;
+// Of Newton's method for a normal force, and on an ellipse: far more than any has taken.
+constexpr int kNormalSteps = 60, kEllipseSteps = 60;
+// What is rounding of a sum, over its terms.
+constexpr double kRounding = 4. * std::numeric_limits<double>::epsilon();
+
+// A number limited to an interval that is z times as large, and what that means.
+struct Limited {
+  double value, by_value, by_normal, push;
+};
+Limited limit(double value, double normal, double lower, double upper) {
+  const double low = normal * lower, high = normal * upper;
+  if (value > high || lower == upper) return {high, 0., upper, (value - high) * upper};
+  if (value < low) return {low, 0., lower, (value - low) * lower};
+  return {value, 1., 0., 0.};
+}
+
+}  // namespace
+
+ScaledSection::ScaledSection(const Section& section, const Vector2d& scale)
+    : lower_(section.lower().cwiseProduct(scale)), upper_(section.upper().cwiseProduct(scale)) {
+  switch (section.shape()) {
+    case Section::Shape::Rectangle:
+      break;
+    case Section::Shape::Disc:
+      shape_ = scale.x() == scale.y() ? Shape::Disc : Shape::Ellipse;
+      radii_ = section.radius() * scale;
+      break;
+    case Section::Shape::Polygon:
+      shape_ = Shape::Polygon;
+      vertices_ = scale.asDiagonal() * section.vertices();
+      normals_.resize(2, vertices_.cols());
+      offsets_.resize(vertices_.cols());
+      for (Index k = 0; k < vertices_.cols(); ++k) {
+        const Vector2d edge = vertices_.col((k + 1) % vertices_.cols()) - vertices_.col(k);
+        normals_.col(k) = Vector2d(edge.y(), -edge.x()).normalized();
+        offsets_[k] = normals_.col(k).dot(vertices_.col(k));
+      }
+      break;
+  }
+}
+
+void ScaledSection::project(const Vector2d& point, double normal, Response& response) const {
+  if (normal <= 0.) {
+    const Vector2d exposed = findExposed(point);
+    response = {Vector2d::Zero(), Matrix2d::Zero(), exposed, point.dot(exposed),
+                exposed.squaredNorm()};
+    return;
+  }
+  switch (shape_) {
+    case Shape::Box: {
+      const Limited x = limit(point.x(), normal, lower_.x(), upper_.x());
+      const Limited y = limit(point.y(), normal, lower_.y(), upper_.y());
+      response.point << x.value, y.value;
+      response.by_point << x.by_value, 0., 0., y.by_value;
+      response.by_normal << x.by_normal, y.by_normal;
+      response.push = x.push + y.push;
+      response.stiffening = response.by_normal.squaredNorm();
+      return;
+    }
+    case Shape::Disc: {
+      const double radius = radii_.x(), size = point.norm();
+      if (size <= radius * normal) break;
+      const Vector2d along = point / size;
+      response.point = radius * normal * along;
+      response.by_point =
+          radius * normal / size * (Matrix2d::Identity() - along * along.transpose());
+      response.by_normal = radius * along;
+      response.push = radius * (size - radius * normal);
+      response.stiffening = radius * radius;
+      return;
+    }
+    case Shape::Ellipse:
+      if (point.cwiseQuotient(radii_).norm() <= normal) break;
+      projectOnEllipse(point, normal, response);
+      return;
+    case Shape::Polygon:
+      projectOnPolygon(point, normal, response);
+      return;
+  }
+  response = {point, Matrix2d::Identity(), Vector2d::Zero(), 0., 0.};
+}
+
+// The points p = A (A + t)⁻¹ g, A the squares of the radii, with pᵀ A⁻¹ p = z²: t > 0 is the root
+// of ‖A^½ (A + t)⁻¹ g‖ − z, to which Newton's method on its inverse rises from 0 (the secular
+// equation of trust regions, Conn, Gould and Toint, Trust-Region Methods, 2000, section 7.3).
+void ScaledSection::projectOnEllipse(const Vector2d& point, double normal,
+                                     Response& response) const {
+  const Vector2d squares = radii_.cwiseAbs2();
+  double t = 0.;
+  for (int step = 0; step < kEllipseSteps; ++step) {
+    const Vector2d sums = squares.array() + t;
+    const Vector2d scaled = radii_.cwiseProduct(point).cwiseQuotient(sums);
+    const double size = scaled.norm();
+    const double change =
+        (size / normal - 1.) * size * size / scaled.cwiseAbs2().cwiseQuotient(sums).sum();
+    t += change;
+    if (!(change > kRounding * t)) break;
+  }
+  const Vector2d sums = squares.array() + t;
+  const Vector2d factors = squares.cwiseQuotient(sums);
+  const Vector2d q = factors.cwiseProduct(point).cwiseQuotient(sums);
+  response.point = factors.cwiseProduct(point);
+  const double outward = response.point.cwiseQuotient(squares).dot(q);
+  response.by_point = Matrix2d(factors.asDiagonal()) - q * q.transpose() / outward;
+  response.by_normal = q * (normal / outward);
+  response.push = (point - response.point).dot(response.point) / normal;
+  response.stiffening = (response.by_normal.dot(point) - response.push) / normal;
+}
+
+// On the nearest of the edges beyond which the point is, or at its end.
+void ScaledSection::projectOnPolygon(const Vector2d& point, double normal,
+                                     Response& response) const {
+  const Index count = vertices_.cols();
+  double nearest = std::numeric_limits<double>::infinity();
+  bool is_inside = count > 2;
+  for (Index k = 0; k < count; ++k) {
+    const Vector2d outward = normals_.col(k);
+    const double beyond = outward.dot(point) - normal * offsets_[k];
+    if (count > 2 && beyond <= 0.) continue;
+    is_inside = false;
+    const Vector2d along(-outward.y(), outward.x());
+    const Vector2d first = vertices_.col(k), last = vertices_.col((k + 1) % count);
+    const double from = normal * along.dot(first), to = normal * along.dot(last);
+    const double place = along.dot(point);
+    if (place > from && place < to) {
+      if (beyond * beyond >= nearest) continue;
+      nearest = beyond * beyond;
+      const double offset = offsets_[k];
+      response.point = place * along + normal * offset * outward;
+      response.by_point = along * along.transpose();
+      response.by_normal = offset * outward;
+      response.push = beyond * offset;
+      response.stiffening = offset * offset;
+    } else {
+      const Vector2d& vertex = place <= from ? first : last;
+      const double distance = (point - normal * vertex).squaredNorm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      response = {normal * vertex, Matrix2d::Zero(), vertex, (point - normal * vertex).dot(vertex),
+                  vertex.squaredNorm()};
+    }
+  }
+  if (is_inside) response = {point, Matrix2d::Identity(), Vector2d::Zero(), 0., 0.};
+}
+
+// A point that is as far as any in a direction.
+Vector2d ScaledSection::findExposed(const Vector2d& direction) const {
+  switch (shape_) {
+    case Shape::Box:
+      return (direction.array() > 0.).select(upper_, lower_);
+    case Shape::Disc:
+    case Shape::Ellipse: {
+      const Vector2d stretched = radii_.cwiseProduct(direction);
+      const double size = stretched.norm();
+      return size > 0. ? Vector2d(radii_.cwiseProduct(stretched) / size) : Vector2d::Zero();
+    }
+    case Shape::Polygon:
+      break;
+  }
+  Index farthest = 0;
+  (direction.transpose() * vertices_).maxCoeff(&farthest);
+  return vertices_.col(farthest);
+}
+
+double ScaledSection::support(const Vector2d& direction) const {
+  return direction.dot(findExposed(direction));
+}
+
+ScaledSection ScaledSection::expose(const Vector2d& direction, double tolerance) const {
+  ScaledSection face;
+  if (shape_ == Shape::Box) {
+    face.lower_ = (direction.array() > tolerance).select(upper_, lower_);
+    face.upper_ = (direction.array() < -tolerance).select(lower_, upper_);
+    return face;
+  }
+  if (direction.norm() <= tolerance) return *this;
+  face.lower_ = face.upper_ = findExposed(direction);
+  if (shape_ != Shape::Polygon) return face;
+  // An edge whose ends are as far.
+  const Index count = vertices_.cols();
+  for (Index k = 0; k < count; ++k) {
+    const Vector2d along = vertices_.col((k + 1) % count) - vertices_.col(k);
+    if (std::abs(direction.dot(along)) <= tolerance * along.norm() &&
+        direction.dot(normals_.col(k)) > 0.)
+      return edge(k);
+  }
+  return face;
+}
+
+ScaledSection ScaledSection::edge(Index k) const {
+  ScaledSection edge;
+  edge.shape_ = Shape::Polygon;
+  edge.vertices_.resize(2, 2);
+  edge.vertices_ << vertices_.col(k), vertices_.col((k + 1) % vertices_.cols());
+  edge.normals_.resize(2, 2);
+  edge.normals_ << normals_.col(k), -normals_.col(k);
+  edge.offsets_ = Vector2d(offsets_[k], -offsets_[k]);
+  return edge;
+}
+
+ScaledSection ScaledSection::hold(const Vector2d& point, const Matrix2d& by_point, double normal,
+                                  const Vector2d& direction, Matrix2d& bend) const {
+  bend.setZero();
+  ScaledSection face;
+  if (shape_ == Shape::Box) {
+    const Vector2d place = point / normal;
+    face.lower_ = (by_point.diagonal().array() != 0.).select(lower_, place);
+    face.upper_ = (by_point.diagonal().array() != 0.).select(upper_, place);
+    return face;
+  }
+  if (by_point.isIdentity(0.)) return *this;
+  if (shape_ == Shape::Polygon) {
+    face.lower_ = face.upper_ = point / normal;
+    if (by_point.isZero(0.)) return face;
+    Index nearest = 0;
+    (normals_.transpose() * point - normal * offsets_).cwiseAbs().minCoeff(&nearest);
+    return edge(nearest);
+  }
+  face.lower_ = face.upper_ = findExposed(direction);
+  const double size = radii_.cwiseProduct(direction).norm();
+  if (size > 0.)
+    bend = normal / size *
+           (Matrix2d(radii_.cwiseAbs2().asDiagonal()) - face.lower_ * face.lower_.transpose());
+  return face;
+}
+
+ScaledSection::Span ScaledSection::span() const {
+  Span span;
+  const auto add = [&](const Vector2d& axis) { span.axes.col(span.count++) = axis; };
+  switch (shape_) {
+    case Shape::Box:
+      span.offset = (lower_.array() == upper_.array()).select(lower_, 0.);
+      if (lower_.x() < upper_.x()) add(Vector2d::UnitX());
+      if (lower_.y() < upper_.y()) add(Vector2d::UnitY());
+      break;
+    case Shape::Polygon:
+      if (vertices_.cols() == 2) {
+        span.offset = offsets_[0] * normals_.col(0);
+        add(Vector2d(-normals_(1, 0), normals_(0, 0)));
+        break;
+      }
+      [[fallthrough]];
+    case Shape::Disc:
+    case Shape::Ellipse:
+      add(Vector2d::UnitX());
+      add(Vector2d::UnitY());
+      break;
+  }
+  return span;
+}
+
+ScaledSet::ScaledSet(const ContactSet& set, const Eigen::VectorXd& weights, double unit)
+    : is_grasp_(set.kind() == ContactSet::Kind::Grasp), size_(int(set.size())) {
+  lower_.head(size_) = set.lower().head(size_).cwiseProduct(weights) / unit;
+  upper_.head(size_) = set.upper().head(size_).cwiseProduct(weights) / unit;
+  if (is_grasp_) return;
+  friction_ = ScaledSection(set.friction(), weights.head<2>() / weights[kNormal]);
+  if (size_ == 3) return;
+  moments_ = ScaledSection(set.moments(), weights.segment<2>(3) / weights[kNormal]);
+  yaw_ = set.gamma() * weights[kYaw] / weights[kNormal] * Vector2d(-1., 1.);
+}
+
+void ScaledSet::projectAt(const Vector6& point, double normal, Parts& parts) const {
+  friction_.project(point.head<2>(), normal, parts.friction);
+  parts.push = parts.friction.push;
+  parts.stiffness = 1. + parts.friction.stiffening;
+  if (size_ == 3) return;
+  moments_.project(point.segment<2>(3), normal, parts.moments);
+  const Limited yaw = limit(point[kYaw], normal, yaw_[0], yaw_[1]);
+  parts.yaw = yaw.value;
+  parts.yaw_growth = yaw.by_normal;
+  parts.push += parts.moments.push + yaw.push;
+  parts.stiffness += parts.moments.stiffening + yaw.by_normal * yaw.by_normal;
+}
+
+// The root of z − g_z − Σ push(z), which rises; Newton's method within a bracket, from where all
+// are inside, or from zero. Returns whether it lies between the bounds of the normal force, and not
+// at one of them.
+bool ScaledSet::findNormal(const Vector6& point, double& normal, Parts& parts) const {
+  const double pull = point[kNormal];
+  double lower = lower_[kNormal], upper = upper_[kNormal];
+  bool is_lower_known = false, is_upper_known = false;
+  normal = std::clamp(pull, lower, upper);
+  for (int step = 0; step < kNormalSteps; ++step) {
+    projectAt(point, normal, parts);
+    const double off = normal - pull - parts.push;
+    if (std::abs(off) <= kRounding * (normal + std::abs(pull) + std::abs(parts.push))) break;
+    (off > 0. ? upper : lower) = normal;
+    (off > 0. ? is_upper_known : is_lower_known) = true;
+    if (!(lower < upper)) break;
+    // A step beyond the bracket ends at a bound that has not been looked at, or in the middle.
+    double next = normal - off / parts.stiffness;
+    if (next == normal) break;
+    if (next <= lower)
+      next = is_lower_known ? 0.5 * (lower + upper) : lower;
+    else if (next >= upper)
+      next = is_upper_known ? 0.5 * (lower + upper) : upper;
+    normal = next;
+  }
+  return normal > lower_[kNormal] && normal < upper_[kNormal];
+}
+
+void ScaledSet::project(const Vector6& point, Response& response) const {
+  response = Response();
+  if (is_grasp_) {
+    response.force = point.cwiseMax(lower_).cwiseMin(upper_);
+    for (int k = 0; k < 6; ++k) {
+      const double is_free = point[k] > lower_[k] && point[k] < upper_[k] ? 1. : 0.;
+      (k < 3 ? response.of_force(k, k) : response.of_moment(k - 3, k - 3)) = is_free;
+    }
+    return;
+  }
+  double normal = 0.;
+  Parts parts;
+  const bool is_free = findNormal(point, normal, parts);
+  if (normal <= 0.) return;
+  response.force.head<2>() = parts.friction.point;
+  response.force[kNormal] = normal;
+  response.of_force.topLeftCorner<2, 2>() = parts.friction.by_point;
+  if (size_ == 6) {
+    response.force.segment<2>(3) = parts.moments.point;
+    response.force[kYaw] = parts.yaw;
+    response.of_moment.topLeftCorner<2, 2>() = parts.moments.by_point;
+    response.of_moment(2, 2) =
+        point[kYaw] > normal * yaw_[0] && point[kYaw] < normal * yaw_[1] ? 1. : 0.;
+  }
+  if (!is_free) return;
+  response.growth.head<2>() = parts.friction.by_normal;
+  response.growth[kNormal] = 1.;
+  if (size_ == 6) {
+    response.growth.segment<2>(3) = parts.moments.by_normal;
+    response.growth[kYaw] = parts.yaw_growth;
+  }
+  response.inverse_stiffness = 1. / parts.stiffness;
+}
+
+double ScaledSet::findRate(const Vector6& direction) const {
+  double rate = direction[kNormal] + friction_.support(direction.head<2>());
+  if (size_ == 6)
+    rate += moments_.support(direction.segment<2>(3)) +
+            std::max(direction[kYaw] * yaw_[0], direction[kYaw] * yaw_[1]);
+  return rate;
+}
+
+double ScaledSet::support(const Vector6& direction, double tolerance) const {
+  if (is_grasp_) {
+    double sum = 0.;
+    for (int k = 0; k < 6; ++k)
+      if (std::abs(direction[k]) > tolerance)
+        sum += direction[k] * (direction[k] > 0. ? upper_[k] : lower_[k]);
+    return sum;
+  }
+  const double rate = findRate(direction);
+  return std::abs(rate) <= tolerance ? 0. : rate * (rate > 0. ? upper_[kNormal] : lower_[kNormal]);
+}
+
+bool ScaledSet::expose(const Vector6& direction, double tolerance, ScaledSet& face) const {
+  face = *this;
+  if (is_grasp_) {
+    face.lower_ = (direction.array() > tolerance).select(upper_, lower_);
+    face.upper_ = (direction.array() < -tolerance).select(lower_, upper_);
+    return face.lower_.allFinite() || face.lower_ == lower_;
+  }
+  face.friction_ = friction_.expose(direction.head<2>(), tolerance);
+  if (size_ == 6) {
+    face.moments_ = moments_.expose(direction.segment<2>(3), tolerance);
+    if (direction[kYaw] > tolerance) face.yaw_[0] = yaw_[1];
+    if (direction[kYaw] < -tolerance) face.yaw_[1] = yaw_[0];
+  }
+  const double rate = findRate(direction);
+  if (rate > tolerance) face.lower_[kNormal] = upper_[kNormal];
+  if (rate < -tolerance) face.upper_[kNormal] = lower_[kNormal];
+  return std::isfinite(face.lower_[kNormal]);
+}
+
+void ScaledSet::hold(const Response& response, const Vector6& direction, ScaledSet& face,
+                     Eigen::Matrix3d& of_force, Eigen::Matrix3d& of_moment) const {
+  of_force.setZero();
+  of_moment.setZero();
+  face = *this;
+  const Vector6& x = response.force;
+  if (is_grasp_) {
+    for (int k = 0; k < 6; ++k)
+      if ((k < 3 ? response.of_force(k, k) : response.of_moment(k - 3, k - 3)) == 0.)
+        face.lower_[k] = face.upper_[k] = x[k];
+    return;
+  }
+  const double normal = x[kNormal];
+  if (response.inverse_stiffness == 0.) face.lower_[kNormal] = face.upper_[kNormal] = normal;
+  if (normal <= 0.) return;
+  const auto holdAt = [&](const ScaledSection& section, int first, const auto& by_point,
+                          auto bend) {
+    Matrix2d own;
+    const ScaledSection held =
+        section.hold(x.segment<2>(first), by_point, normal, direction.segment<2>(first), own);
+    bend = own;
+    return held;
+  };
+  face.friction_ = holdAt(friction_, 0, Matrix2d(response.of_force.topLeftCorner<2, 2>()),
+                          of_force.topLeftCorner<2, 2>());
+  if (size_ == 3) return;
+  face.moments_ = holdAt(moments_, 3, Matrix2d(response.of_moment.topLeftCorner<2, 2>()),
+                         of_moment.topLeftCorner<2, 2>());
+  if (response.of_moment(2, 2) == 0.) face.yaw_.setConstant(x[kYaw] / normal);
+}
+
+ScaledSet::Span ScaledSet::span() const {
+  Span span;
+  const auto add = [&](const Vector6& axis) { span.axes.col(span.count++) = axis; };
+  if (is_grasp_) {
+    for (int k = 0; k < 6; ++k) {
+      if (lower_[k] < upper_[k])
+        add(Vector6::Unit(k));
+      else
+        span.fixed[k] = lower_[k];
+    }
+    return span;
+  }
+  if (upper_[kNormal] <= 0.) return span;
+  Vector6 growth = Vector6::Unit(kNormal);
+  const ScaledSection::Span friction = friction_.span();
+  growth.head<2>() = friction.offset;
+  for (int k = 0; k < friction.count; ++k) {
+    Vector6 axis = Vector6::Zero();
+    axis.head<2>() = friction.axes.col(k);
+    add(axis);
+  }
+  if (size_ == 6) {
+    const ScaledSection::Span moments = moments_.span();
+    growth.segment<2>(3) = moments.offset;
+    for (int k = 0; k < moments.count; ++k) {
+      Vector6 axis = Vector6::Zero();
+      axis.segment<2>(3) = moments.axes.col(k);
+      add(axis);
+    }
+    if (yaw_[0] < yaw_[1])
+      add(Vector6::Unit(kYaw));
+    else
+      growth[kYaw] = yaw_[0];
+  }
+  if (lower_[kNormal] < upper_[kNormal])
+    add(growth);
+  else
+    span.fixed = lower_[kNormal] * growth;
+  return span;
+}
+
+}  // namespace dynacom::internal
