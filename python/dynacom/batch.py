@@ -231,7 +231,7 @@ def run_batch(
         found = overview(store.table)
         links = {}
         if report:
-            links = write_reports(out, found.worst[:report], files, job)
+            links = write_reports(out, found.worst[:report], files, places, job)
         write_index(out / "index.html", found, links, job)
     return found
 

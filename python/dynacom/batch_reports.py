@@ -3,13 +3,18 @@
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from dynacom.batch_files import local_copy, printable
 from dynacom.batch_row import Job, Row
 from dynacom.errors import DynacomError
-from dynacom.motion_report import analyze
+from dynacom.motion_mark import mark_of
+from dynacom.motion_report import FILES, analyze
+from dynacom.repair import repair
+from dynacom.results_folder import save_results
 
 
 def check_reports() -> None:
@@ -25,12 +30,19 @@ def check_reports() -> None:
 
 
 def write_reports(
-    out: Path, rows: Iterable[Row], files: Mapping[str, str], job: Job
+    out: Path,
+    rows: Iterable[Row],
+    files: Mapping[str, str],
+    places: Mapping[str, str],
+    job: Job,
 ) -> dict[tuple[str, str | None], str]:
-    """Writes out/reports/CLIP/, as ``dynacom analyze`` does, for some clips.
+    """Writes out/reports/CLIP/ for some clips.
+
+    It is what ``dynacom analyze`` writes, or, of clips that were repaired, ``dynacom repair``.
 
     Args:
         files: name in results -> file.
+        places: file -> where it lies among the repaired motions, in a job that repairs.
 
     Returns:
         File's name and clip -> link to its page; without what cannot be read any more.
@@ -44,21 +56,48 @@ def write_reports(
         folder = Path("reports", _folder(name, clip))
         try:
             with local_copy(files[name]) as path:
-                found = analyze(
-                    path,
-                    job.robot,
-                    fps=job.fps,
-                    quat=job.quat,
-                    trust=job.trust,
-                    clip=clip,
-                    options=job.options,
-                )
+                if row["repair"] == "repaired" and row["repair_file"] is not None:
+                    write = _repair_report(path, row, places[files[name]], job)
+                else:
+                    write = _report(path, row, job)
         except (DynacomError, OSError):
             continue
-        found.summary["clip"] = printable(found.summary["clip"])
-        found.save(out / folder)
+        save_results(out / folder, FILES, write)
         links[name, clip] = f"{folder.as_posix()}/report.html"
     return links
+
+
+def _report(path: Path, row: Row, job: Job) -> Callable[[Path], None]:
+    """What writes the report of an analysis into a folder."""
+    found = analyze(path, job.robot, **_how(row, job))
+    found.summary["clip"] = printable(found.summary["clip"])
+    return lambda into: found.write_files(into, found.summary, csv=False, page=True)
+
+
+def _repair_report(path: Path, row: Row, place: str, job: Job) -> Callable[[Path], None]:
+    """What writes the report of a repair into a folder: the clip is repaired once more.
+
+    Args:
+        place: of the file that it was written to.
+    """
+    found = repair(path, job.robot, **_how(row, job))
+    found.after.summary["clip"] = printable(found.after.summary["clip"])
+    with tempfile.TemporaryDirectory(prefix="dynacom-") as folder:
+        told, notes = found.write(Path(folder, path.name))
+    # That one is gone: the file is there already, perhaps with other clips in it.
+    told |= mark_of(job.repair / place) | {"file": row["repair_file"]}
+    return lambda into: found.write_files(into, told, notes, csv=False, page=True)
+
+
+def _how(row: Row, job: Job) -> dict[str, Any]:
+    """Arguments of :func:`analyze` and :func:`repair`."""
+    return {
+        "fps": job.fps,
+        "quat": job.quat,
+        "trust": job.trust,
+        "clip": row["clip"],
+        "options": job.options,
+    }
 
 
 def _folder(name: str, clip: str | None) -> str:

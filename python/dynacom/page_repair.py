@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """What a report's page shows of a repair: its section, and columns to plot."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from dynacom.page_html import number_text, table, time_button
 from dynacom.repair_change import Before, change_arrays, com_change
+from dynacom.repair_summary import CHANGES, compared_values, moves
 from dynacom.robots import Robot
 
 # Outcome -> the section's kind, its title, and what it says.
@@ -25,7 +26,10 @@ _OUTCOMES = {
         "The motion was changed as this says, which does not suffice.",
     ),
 }
-_GHOST = "What it was before is the ghost in the scene, and pale or dotted in the plots."
+_GHOST = (
+    "What it was before is the ghost in the scene, pale and dotted from above, and blue among "
+    "residuals."
+)
 
 
 def shown_before(before: Before | None, summary: Mapping[str, Any]) -> Before | None:
@@ -87,7 +91,8 @@ def repair_section(summary: Mapping[str, Any], before: Before | None) -> str:
     unknown = ("unknown", "Repair", escape(outcome or ""))
     kind, title, text = _OUTCOMES.get(outcome, unknown)
     sentences = text if before is None else f"{text} {_GHOST}"
-    details = " ".join(filter(None, (_stances(repair), _file_text(repair))))
+    texts = (_moves_text(repair, before), _stances(repair), _file_text(repair))
+    details = " ".join(filter(None, texts))
     parts = [
         f'<section class="repair {kind}"><h2>{title}</h2>',
         f'<p class="caption">{sentences}</p>',
@@ -122,48 +127,37 @@ def _file_text(repair: Mapping[str, Any]) -> str:
 
 def _compared(repair: Mapping[str, Any]) -> Iterator[Sequence[str]]:
     """What there was before and is after, of what is known."""
-    before, after = (repair.get(name) or {} for name in ("missing_before", "missing"))
-    stances = repair.get("stances") or {}
-    verdicts = [_verdict(repair, ending) for ending in ("_before", "", "_filtered")]
     rows = [
-        ("Verdict", *verdicts[:2]),
-        ("Verdict, filtered", None, verdicts[2]),
-        *_pair("Missing force, RMS", before, after, "force_rms", _plain("m g")),
-        *_pair("Missing moment, RMS", before, after, "torque_rms", _plain("m g·m")),
-        *_pair("Frames out of reach", before, after, "frames", str),
+        ("Verdict", _verdict(repair, "_before"), _verdict(repair, "")),
+        ("Verdict, without the mark", None, _verdict(repair, "_filtered")),
+        ("Verdict, as it was written", None, _verdict(repair, "_written")),
     ]
-    for title, key, unit in (
-        ("Stance, largest speed", "largest_speed", "mm/s"),
-        ("Stance, largest drift", "largest_drift", "mm"),
-    ):
-        values = {"before": stances.get(f"{key}_before")}, {"before": stances.get(key)}
-        rows += _pair(title, *values, "before", _millimetres(unit))
+    for title, unit, *values in compared_values(repair):
+        rows.append((title, *(None if v is None else _value_text(v, unit) for v in values)))
     for title, *values in rows:
         if any(value is not None for value in values):
             yield title, *("–" if value is None else value for value in values)
 
 
-def _pair(
-    title: str,
-    before: Mapping[str, Any],
-    after: Mapping[str, Any],
-    key: str,
-    text: Callable[[Any], str],
-) -> list[tuple[str, str | None, str | None]]:
-    values = (before.get(key), after.get(key))
-    return [(title, *(None if value is None else text(value) for value in values))]
+def _value_text(value: float | None, unit: str) -> str:
+    """A value in the unit in which people want it."""
+    if value is None:
+        return number_text(None)
+    if unit == "frames":
+        return str(value)
+    if unit == "rad":
+        return f"{_long_text(float(np.degrees(value)))}°"
+    if unit in ("m", "m/s"):
+        return _long_text(1e3 * value, f"m{unit}")
+    unit = unit.replace("m g m", "m g·m")
+    if 0.0 < value < 1e-6:  # which is rounding
+        return f"&lt;&nbsp;10<sup>−6</sup>&nbsp;{unit}"
+    return number_text(value, unit)
 
 
-def _plain(unit: str) -> Callable[[float], str]:
-    return lambda value: number_text(value, unit)
-
-
-def _millimetres(unit: str = "mm") -> Callable[[float | None], str]:
-    return lambda value: number_text(None if value is None else 1e3 * value, unit)
-
-
-def _degrees(value: float | None) -> str:
-    return number_text(None if value is None else float(np.degrees(value)), "°")
+def _long_text(value: float, unit: str = "") -> str:
+    """With three digits, or all in front of the point."""
+    return number_text(value, unit, max(3, len(f"{abs(value):.0f}")))
 
 
 def _verdict(repair: Mapping[str, Any], ending: str) -> str | None:
@@ -176,18 +170,25 @@ def _verdict(repair: Mapping[str, Any], ending: str) -> str | None:
 
 
 def _changes(repair: Mapping[str, Any]) -> Iterator[Sequence[str]]:
-    for key, title, text in (
-        ("root", "Root, displaced", _millimetres()),
-        ("joints", "Joints, turned", _degrees),
-        ("com", "Centre of mass, displaced", _millimetres()),
-    ):
+    for key, title, unit in CHANGES:
         change = repair.get(key)
         if not change:
             continue
-        largest = text(change.get("largest"))
+        largest = _value_text(change.get("largest"), unit)
         if change.get("joint"):
             largest += f"<small>{escape(change['joint'])}</small>"
-        yield title, text(change.get("rms")), largest, time_button(change.get("time"))
+        yield title, _value_text(change.get("rms"), unit), largest, time_button(change.get("time"))
+
+
+def _moves_text(repair: Mapping[str, Any], before: Before | None) -> str:
+    texts = [
+        f"{title} by {_value_text(value, unit) if unit else f'a factor of {number_text(value)}'}."
+        for title, unit, value in moves(repair)
+    ]
+    is_elsewhere = any(unit for _, unit, _ in moves(repair))
+    if before is not None and is_elsewhere:
+        texts.append("The changes above are besides that; displacements over time include it.")
+    return " ".join(texts)
 
 
 def _stances(repair: Mapping[str, Any]) -> str:
@@ -198,31 +199,22 @@ def _stances(repair: Mapping[str, Any]) -> str:
 
 
 def _reasons(reasons: Sequence[Mapping[str, Any]]) -> str:
-    rows = (
-        (
-            f"<code>{escape(reason.get('code') or '')}</code> {escape(reason.get('text') or '')}",
-            time_button(reason.get("time")),
-        )
-        for reason in reasons
-    )
+    rows = ((_reason_text(reason), time_button(reason.get("time"))) for reason in reasons)
     return _table_of(("What could not be mended", "at"), rows, "reasons")
+
+
+def _reason_text(reason: Mapping[str, Any]) -> str:
+    text = f"<code>{escape(reason.get('code') or '')}</code> {escape(reason.get('text') or '')}"
+    hint = reason.get("hint")
+    return f"{text}<small>What may help: {escape(hint)}</small>" if hint else text
 
 
 def _rungs(rungs: Sequence[Mapping[str, Any]]) -> str:
     if not rungs:
         return ""
-
-    def count(value: int | None) -> str:
-        return "–" if value is None else str(value)
-
-    rows = [
-        (
-            f"<b>{escape(rung.get('name') or '')}</b> {escape(rung.get('text') or '')}",
-            count(rung.get("missing_frames_before")),
-            count(rung.get("missing_frames_after")),
-        )
+    items = "".join(
+        f"<li><b>{escape(rung.get('name') or '')}</b> {escape(rung.get('text') or '')}</li>"
         for rung in rungs
-    ]
-    titles = ("Step", "Frames out of reach before", "after")
+    )
     plural = "s" if len(rungs) > 1 else ""
-    return f"<details><summary>{len(rungs)} step{plural}</summary>{table(titles, rows)}</details>"
+    return f"<details><summary>{len(rungs)} step{plural}</summary><ol>{items}</ol></details>"

@@ -3,7 +3,7 @@
 
 import copy
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -184,17 +184,35 @@ class RepairReport:
             raise DynacomError(f"{folder}: must be another folder than that of the motion, {name}")
 
         def write(into: Path) -> None:
-            mark, notes = self.write(into / name)
-            summary = self.summary | {
-                "repair": self.summary["repair"] | mark,
-                "notes": [*self.summary["notes"], *notes],
-            }
-            before = Before(self.before.motion.q, self.before.arrays, self.before.summary)
-            self.after.write_files(into, summary, csv=csv, page=page, before=before)
+            self.write_files(into, *self.write(into / name), csv=csv, page=page)
             if export_contacts:
                 write_contacts(self.after, into / _CONTACTS_FILE)
 
         return save_results(folder, others, write)
+
+    def write_files(
+        self,
+        folder: Path,
+        told: Mapping[str, Any],
+        notes: Iterable[str],
+        *,
+        csv: bool,
+        page: bool,
+    ) -> None:
+        """Writes the report into a folder: the files of :meth:`save`, but for motion and contacts.
+
+        Args:
+            told, notes: of the motion's file, see :meth:`write`.
+
+        Raises:
+            OSError, DynacomError: as :meth:`MotionReport.write_files`.
+        """
+        summary = self.summary | {
+            "repair": self.summary["repair"] | told,
+            "notes": [*self.summary["notes"], *notes],
+        }
+        before = Before(self.before.motion.q, self.before.arrays, self.before.summary)
+        self.after.write_files(folder, summary, csv=csv, page=page, before=before)
 
 
 def repair(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-2-Clause
 """What a repair did, in numbers and in words: the entry ``repair`` of a summary."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,14 @@ _HINTS = {
     "discontinuity": "the clip may be cut there",
     "downward_normal": "the contacts of the robot's file may be turned",
 }
+
+#: Changes of the motion: key in the summary, what it is called, unit.
+CHANGES = (
+    ("root", "Root displaced", "m"),
+    ("com", "Centre of mass displaced", "m"),
+    ("turn", "Root turned", "rad"),
+    ("joints", "Joints turned", "rad"),
+)
 
 
 def repair_summary(robot: Robot, repair: MotionRepair) -> dict[str, Any]:
@@ -125,19 +133,12 @@ def _drift(repair: MotionRepair, found: MotionExamination, stance: Any) -> float
 
 
 def _rung(step: RepairStep, before: MotionExamination) -> dict[str, Any]:
-    counts = {}
-    if step.rung == "balance":
-        counts = {
-            "missing_frames_before": int(step.before),
-            "missing_frames_after": int(step.after),
-        }
     return {
         "name": step.rung,
         "before": step.before,
         "after": step.after,
         "kept": step.is_kept,
         "text": " ".join(_rung_texts(step, before)),
-        **counts,
     }
 
 
@@ -181,3 +182,53 @@ def _rung_texts(step: RepairStep, before: MotionExamination) -> Iterator[str]:
 
 def _millimetres(value: float) -> str:
     return "not known" if np.isnan(value) else f"{1e3 * value:.{1 if value < 0.01 else 0}f} mm"
+
+
+# What it says, for those who show it.
+
+
+def compared_values(repair: Mapping[str, Any]) -> Iterator[tuple[str, str, Any, Any]]:
+    """What there was before and is after.
+
+    Args:
+        repair: the entry, anything of which may be unknown.
+
+    Yields:
+        What it is called, its unit, and both values, None where they are not known. Frames are
+        counts, their unit is ``frames``.
+    """
+    before, after, stances, limits = (
+        repair.get(name) or {} for name in ("missing_before", "missing", "stances", "limits")
+    )
+    for title, key, unit in (
+        ("Residual force (RMS)", "force_rms", "m g"),
+        ("Residual moment (RMS)", "torque_rms", "m g m"),
+        ("Frames out of reach", "frames", "frames"),
+    ):
+        yield title, unit, before.get(key), after.get(key)
+    for title, key, unit in (
+        ("Contacts slide by up to", "largest_speed", "m/s"),
+        ("Contacts drift by up to", "largest_drift", "m"),
+    ):
+        yield title, unit, stances.get(f"{key}_before"), stances.get(key)
+    if any(limits.values()):
+        yield "Joints beyond limits by", "rad", limits.get("before"), limits.get("after")
+
+
+def moves(repair: Mapping[str, Any]) -> Iterator[tuple[str, str, float]]:
+    """What was done to all of the motion, besides its changes.
+
+    Args:
+        repair: the entry, anything of which may be unknown.
+
+    Yields:
+        What it is called, the unit of by how much, and that.
+    """
+    for key, title, unit, nothing in (
+        ("ground_offset", "Lifted to the ground", "m", 0.0),
+        ("ground_tilt", "Turned to the ground", "rad", 0.0),
+        ("stretch", "Time stretched", "", 1.0),
+    ):
+        value = repair.get(key)
+        if value is not None and value != nothing:
+            yield title, unit, value

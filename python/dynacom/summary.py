@@ -2,7 +2,6 @@
 """Summaries of a motion, and of many, to be printed."""
 
 import math
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
@@ -10,6 +9,7 @@ from rich.table import Table
 
 from dynacom.distance import distance_text
 from dynacom.motion_report import TOO_SHORT
+from dynacom.repair_summary import CHANGES, compared_values, moves
 
 if TYPE_CHECKING:
     from dynacom.batch import BatchProgress
@@ -103,31 +103,27 @@ def repair_table(summary: dict[str, Any]) -> Table:
     table.add_row("Verdict", " → ".join(verdicts))
     table.add_row("  without the mark", _verdict_text(repair, "_filtered"))
     table.add_row("  as it was written", _verdict_text(repair, "_written"))
-    for title, texts in _compared(repair, summary["frames"]):
+    for title, unit, *values in compared_values(repair):
+        if unit == "frames":
+            texts = [f"{count} ({count / summary['frames']:.1%})" for count in values]
+        else:
+            texts = [_value_text(value, unit) for value in values]
         table.add_row(title, " → ".join(texts))
     stances = repair["stances"]
     if stances["count"]:
         table.add_row("Stances held still", f"{stances['held']} of {stances['count']}")
     table.add_section()
-    for key, title, text in (
-        ("root", "Root displaced", _millimetres),
-        ("com", "Centre of mass displaced", _millimetres),
-        ("turn", "Root turned", _degrees),
-        ("joints", "Joints turned", _degrees),
-    ):
+    for key, title, unit in CHANGES:
         change = repair[key]
         what = f"{change['joint']}, " if change.get("joint") else ""
         table.add_row(
             title,
-            f"{text(change['rms'])} (RMS), up to {text(change['largest'])} "
+            f"{_value_text(change['rms'], unit)} (RMS), "
+            f"up to {_value_text(change['largest'], unit)} "
             f"({escape(what)}at {change['time']:.2f} s)",
         )
-    if repair["ground_offset"] != 0.0:
-        table.add_row("Lifted to the ground", f"by {_millimetres(repair['ground_offset'])}")
-    if repair["ground_tilt"] != 0.0:
-        table.add_row("Turned to the ground", f"by {_degrees(repair['ground_tilt'])}")
-    if repair["stretch"] != 1.0:
-        table.add_row("Time stretched", f"by a factor of {repair['stretch']:g}")
+    for title, unit, value in moves(repair):
+        table.add_row(title, f"by {_value_text(value, unit)}")
     table.add_section()
     for rung in repair["rungs"]:
         table.add_row(f"Step: {rung['name']}", escape(rung["text"]))
@@ -135,25 +131,12 @@ def repair_table(summary: dict[str, Any]) -> Table:
     return table
 
 
-def _compared(repair: dict[str, Any], frames: int) -> Iterator[tuple[str, list[str]]]:
-    """What there was before and is after, of what is known."""
-    missing = repair["missing_before"], repair["missing"]
-    for title, key, unit in (
-        ("Residual force", "force_rms", "m g"),
-        ("Residual moment", "torque_rms", "m g m"),
-    ):
-        yield f"{title} (RMS)", [f"{_number(entry[key])} {unit}" for entry in missing]
-    counts = [entry["frames"] for entry in missing]
-    yield "Frames out of reach", [f"{count} ({count / frames:.1%})" for count in counts]
-    for title, key, unit in (
-        ("Contacts slide by up to", "largest_speed", "mm/s"),
-        ("Contacts drift by up to", "largest_drift", "mm"),
-    ):
-        values = [repair["stances"][f"{key}{ending}"] for ending in ("_before", "")]
-        yield title, [_millimetres(value, unit) for value in values]
-    limits = repair["limits"]
-    if any(limits.values()):
-        yield "Joints beyond limits by", [_degrees(limits[key]) for key in ("before", "after")]
+def _value_text(value: float | None, unit: str) -> str:
+    if unit == "rad":
+        return _degrees(value)
+    if unit in ("m", "m/s"):
+        return _millimetres(value, f"m{unit}")
+    return f"{_number(value)} {unit}" if unit else f"a factor of {value:g}"
 
 
 def _verdict_text(repair: dict[str, Any], ending: str) -> str:
@@ -163,7 +146,7 @@ def _verdict_text(repair: dict[str, Any], ending: str) -> str:
     return f"{text} ({', '.join(codes)})" if codes else text
 
 
-def _millimetres(value: float | None, unit: str = "mm") -> str:
+def _millimetres(value: float | None, unit: str) -> str:
     if value is None:
         return "–"
     digits = ".3g" if abs(value) < 1.0 else ".0f"

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import types
 from pathlib import Path
 
 import numpy as np
@@ -522,6 +523,50 @@ def test_index(clips, result):
         count = sum(code in text.split("+") for text in codes)
         assert f'<td>{code}: {REASONS[code]}</td><td class="n">{count} (' in section
     assert "<td>not repaired: too_short</td>" in page
+
+
+def test_reports_of_repaired_clips_are_those_of_repair(clips, tmp_path, anymal, monkeypatch):
+    """With the motion before; of others the report is that of the analysis."""
+    # What a page looks like is tested elsewhere.
+    page = types.ModuleType("dynacom.page")
+    page.write_page = lambda path, *_, before: path.write_text("" if before is None else "before")
+    monkeypatch.setitem(sys.modules, "dynacom.page", page)
+    folder, out = tmp_path / "motions", tmp_path / "out"
+    names = ("sub/fast.npz", "sub/air.npz", "many.pkl", "calm.csv", "fast.csv")
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(clips[0] / name, folder / name)
+    options = dynacom.AnalysisOptions()
+    options.repair.displacement = 0.004
+    table = repair(folder, out, report=10, options=options)
+    text = (out / "index.html").read_text()
+    links = {title: link for link, title in re.findall(r'<a href="([^"]+)">([^<]+)</a>', text)}
+    rows = [row for row in table.to_pylist() if row["status"] == "ok"]
+    assert sum(row["repair"] == "repaired" for row in rows) == 3
+    assert len(links) == len(rows) == len(names) + 2
+    for row in rows:
+        title = row["file"] if row["clip"] is None else f"{row['file']}: {row['clip']}"
+        report = out / Path(links[title]).parent
+        # No motion is written but where it is already.
+        files = ["frames.parquet", "report.html", "schedule.yaml", "summary.json"]
+        assert sorted(path.name for path in report.iterdir()) == files
+        summary = json.loads((report / "summary.json").read_text())
+        if row["repair"] != "repaired":
+            assert "repair" not in summary
+            assert (report / "report.html").read_text() == ""
+            assert summary["verdict"] == row["verdict"]
+            continue
+        assert (report / "report.html").read_text() == "before"
+        alone = dynacom.repair(row["file"], anymal, clip=row["clip"], options=options)
+        alone.save(tmp_path / "alone")
+        expected = json.loads((tmp_path / "alone" / "summary.json").read_text())
+        expected["repair"] |= dynacom.mark_of(out / row["repair_file"])
+        expected["repair"]["file"] = row["repair_file"]
+        assert summary == expected
+        assert summary["repair"]["verdict_before"] == row["verdict"]
+        assert summary["repair"]["root"]["largest"] == row["repair_root_max"]
+        for name in ("frames.parquet", "schedule.yaml"):
+            assert (report / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
 
 
 def test_an_index_without_repair(tmp_path):

@@ -17,6 +17,7 @@ from dynacom import scene as page_scene
 from dynacom.page import write_page
 from dynacom.repair_change import Before
 from dynacom.robots import Robot
+from dynacom.summary import repair_table
 from helpers import WALKS
 from report_case import Arrays, Summary, repaired_walk, walk_report
 
@@ -281,19 +282,19 @@ REPAIR = {
     "codes": ["feasible"],
     "verdict_filtered": "repairable",
     "codes_filtered": ["foot_sliding"],
+    "verdict_written": "feasible",
+    "codes_written": ["feasible"],
     "missing_before": {"force_rms": 0.0321, "torque_rms": 0.0654, "frames": 263},
     "missing": {"force_rms": 0.00123, "torque_rms": 0.00456, "frames": 7},
     "root": {"rms": 0.0015, "largest": 0.00612, "time": 1.25},
     "joints": {"rms": 0.001, "largest": np.pi / 90.0, "time": 1.5, "joint": "left_knee"},
     "com": {"rms": 0.0011, "largest": 0.00527, "time": 1.75},
-    "rungs": [
-        {
-            "name": "balance",
-            "missing_frames_before": 263,
-            "missing_frames_after": 7,
-            "text": "What moves stays.",
-        }
-    ],
+    "turn": {"rms": np.pi / 360.0, "largest": np.pi / 120.0, "time": 2.0},
+    "ground_offset": 0.0,
+    "ground_tilt": 0.0,
+    "stretch": 1.0,
+    "limits": {"before": 0.0, "after": 0.0},
+    "rungs": [{"name": "balance", "text": "What moves stays."}],
     "stances": {
         **{"count": 12, "held": 10, "largest_speed_before": 0.081, "largest_speed": 0.0123},
         **{"largest_drift_before": 0.0172, "largest_drift": 0.00034},
@@ -342,36 +343,96 @@ def test_the_section_on_repair(talos, repaired, tmp_path, monkeypatch):
     assert REPAIR["sha256"] in text
     for title, *cells in (
         ("Verdict", "not feasible|cop_outside, residual_torque|", "feasible"),
-        ("Verdict, filtered", "–", "repairable|foot_sliding|"),
-        ("Missing force, RMS", "0.0321 m g", "0.00123 m g"),
-        ("Missing moment, RMS", "0.0654 m g·m", "0.00456 m g·m"),
+        ("Verdict, without the mark", "–", "repairable|foot_sliding|"),
+        ("Verdict, as it was written", "–", "feasible"),
+        ("Residual force (RMS)", "0.0321 m g", "0.00123 m g"),
+        ("Residual moment (RMS)", "0.0654 m g·m", "0.00456 m g·m"),
         ("Frames out of reach", "263", "7"),
-        ("Stance, largest speed", "81 mm/s", "12.3 mm/s"),
-        ("Stance, largest drift", "17.2 mm", "0.34 mm"),
-        ("balance What moves stays.", "263", "7"),
+        ("Contacts slide by up to", "81 mm/s", "12.3 mm/s"),
+        ("Contacts drift by up to", "17.2 mm", "0.34 mm"),
     ):
         assert row(text, title) == cells
     for title, rms, largest, time in (
-        ("Root, displaced", "1.5 mm", "6.12 mm", 1.25),
-        ("Joints, turned", "0.0573 °", "2 °|left_knee|", 1.5),
-        ("Centre of mass, displaced", "1.1 mm", "5.27 mm", 1.75),
+        ("Root displaced", "1.5 mm", "6.12 mm", 1.25),
+        ("Centre of mass displaced", "1.1 mm", "5.27 mm", 1.75),
+        ("Root turned", "0.5°", "1.5°", 2.0),
+        ("Joints turned", "0.0573°", "2°|left_knee|", 1.5),
     ):
         *sizes, button = row(text, title)
         assert sizes == [rms, largest]
         assert f'data-time="{time}"' in button
     assert "10 of 12 stances are held still." in text
+    assert "<summary>1 step</summary><ol><li>balance What moves stays.</li></ol>" in text
+    for nothing in ("limits", "the ground", "stretched", "besides"):
+        assert nothing not in text
+
+
+def test_what_only_some_repairs_do(talos, repaired, tmp_path, monkeypatch):
+    """Joints beyond limits, and what was done to all of the motion; numbers small and large."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    before, q, arrays, summary = repaired
+    repair = REPAIR | {
+        "limits": {"before": np.pi / 60.0, "after": 0.0},
+        "ground_offset": -0.0195,
+        "ground_tilt": np.pi / 45.0,
+        "stretch": 1.25,
+        "missing": {"force_rms": 1e-16, "torque_rms": 0.0, "frames": 0},
+        "stances": {"largest_speed_before": 1.1172, "largest_speed": 0.0},
+    }
+    report = (q, arrays, summary | {"repair": repair})
+    text = section(written(tmp_path / "report.html", talos, report, before))
+    for title, *cells in (
+        ("Joints beyond limits by", "3°", "0°"),
+        ("Residual force (RMS)", "0.0321 m g", "&lt; 10<sup>−6</sup> m g"),
+        ("Residual moment (RMS)", "0.0654 m g·m", "0 m g·m"),
+        ("Contacts slide by up to", "1117 mm/s", "0 mm/s"),
+    ):
+        assert row(text, title) == cells
+    moved = "Lifted to the ground by −19.5 mm. Turned to the ground by 4°. "
+    stretched = "Time stretched by a factor of 1.25. "
+    assert f"{moved}{stretched}The changes above are besides that;" in text
+    # Nothing is elsewhere where time is all that was stretched.
+    repair |= {"ground_offset": 0.0, "ground_tilt": 0.0}
+    report = (q, arrays, summary | {"repair": repair})
+    text = section(written(tmp_path / "report.html", talos, report, before))
+    assert f'<p class="caption">{stretched}Written' in text
+
+
+def test_print_and_page_say_the_same(talos, repaired, tmp_path, monkeypatch):
+    """Whatever has a title in the printed table has it in the section."""
+    monkeypatch.setitem(sys.modules, "viser", None)
+    before, q, arrays, summary = repaired
+    repair = REPAIR | {
+        "limits": {"before": 0.1, "after": 0.0},
+        "ground_offset": 0.02,
+        "ground_tilt": 0.1,
+        "stretch": 1.5,
+    }
+    summary = summary | {"repair": repair}
+    text = section(written(tmp_path / "report.html", talos, (q, arrays, summary), before))
+    titles = [title.strip() for title in repair_table(summary).columns[0].cells]
+    assert len(titles) > 15
+    elsewhere = {
+        "Repair": "Repair:",
+        "without the mark": "Verdict, without the mark",
+        "as it was written": "Verdict, as it was written",
+        "Stances held still": "stances are held still",
+        "Step: balance": "balance",
+    }
+    for title in titles:
+        assert title == "Note" or elsewhere.get(title, title) in text
 
 
 def test_what_could_not_be_mended(talos, repaired, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     before, q, arrays, summary = repaired
-    reasons = [{"code": "contact_needed", "time": 1.2, "text": "Nothing touches."}]
+    reasons = [{"code": "contact_needed", "time": 1.2, "text": "Nothing touches.", "hint": "Luck."}]
     failed = REPAIR | {"outcome": "not repaired", "exact": False, "reasons": reasons}
     report = (q, arrays, summary | {"repair": failed})
     text = section(written(tmp_path / "report.html", talos, report, before))
     assert 'class="repair bad"><h2>Repair: not done</h2>' in text
     assert "Written to mended.csv, without a mark" in text
-    (button,) = row(text, "<code>contact_needed</code> Nothing touches.")
+    (button,) = row(text, "<code>contact_needed</code> Nothing touches.|What may help: Luck.|")
     assert 'data-time="1.2"' in button
 
 
@@ -411,7 +472,7 @@ def test_of_a_repair_may_be_unknown(talos, repaired, tmp_path, monkeypatch, dept
             return {key: without(item) for key, item in value.items()}
         return [without(item) for item in value] if value and isinstance(value, list) else None
 
-    reasons = [{"code": "a", "time": 1.2, "text": "b"}]
+    reasons = [{"code": "a", "time": 1.2, "text": "b", "hint": "c"}]
     unknown = without(REPAIR | {"reasons": reasons})
     if depth == "all":
         unknown = dict.fromkeys(REPAIR)
@@ -438,16 +499,16 @@ def test_hostile_repairs(talos, repaired, tmp_path, monkeypatch):
             return [hostile(item) for item in value]
         return HOSTILE if isinstance(value, str) else value
 
-    repair = hostile(REPAIR | {"reasons": [{"code": "a", "time": 1.2, "text": "b"}]})
+    repair = hostile(REPAIR | {"reasons": [{"code": "a", "time": 1.2, "text": "b", "hint": "c"}]})
     repair |= {key: [f"{HOSTILE}, a code"] for key in repair if key.startswith("codes")}
     path = tmp_path / "report.html"
     write_page(path, talos, q, arrays, summary | {"repair": repair}, before=before)
     with open_page(path) as tab:
         tab.locator("#clock", has_text="frame 0").wait_for()
         assert tab.locator("img, main script").count() == 0
-        # The outcome, the file and its sum, three verdicts with their codes, a joint, and two texts
-        # each of a step and of a reason.
-        assert tab.locator(".repair").text_content().count(HOSTILE) == 14
+        # The outcome, the file and its sum, four verdicts with their codes, a joint, two texts of a
+        # step, and three of a reason.
+        assert tab.locator(".repair").text_content().count(HOSTILE) == 17
 
 
 def test_what_repair_has_changed_is_drawn(talos, repaired, tmp_path, monkeypatch):
