@@ -509,12 +509,14 @@ bool DistributionSolver::Workspace::relax(const Vector6& guess) {
   // What is missing is to be accurate: nothing but rounding may be off.
   may_lack = 0.;
   Vector6 centre = start;
-  double former = std::numeric_limits<double>::infinity();
+  double slack = kFaceSlack * mean_compliance, former = missing().norm();
   for (int round = 0; round < kMaximalRounds && iterations < maximal_iterations; ++round) {
+    descend(&Block::face, slack, centre, kMaximalSteps);
     const double size = missing().norm();
     if (size <= enough() || (size <= kMissing && size > 0.5 * former)) break;
-    if (round > 0) former = size;
-    descend(&Block::face, kFaceSlack * mean_compliance, centre, kMaximalSteps);
+    if (size > kFall * former)
+      slack = std::max(slack * kSlackFactor, kLeastSlack * mean_compliance);
+    former = size;
     centre = multipliers;
   }
   const bool given = missing().norm() <= std::max(kMissing, enough());
