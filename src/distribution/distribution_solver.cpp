@@ -36,10 +36,12 @@ constexpr double kRounding = 8. * std::numeric_limits<double>::epsilon();
 // Along a step, what part of the slope at its start is as good as none, and by which part of what
 // the slope promises the dual has to fall at least (Armijo).
 constexpr double kFlat = 0.6, kArmijo = 1e-4;
+// For which ratio of two lengths their middle is the geometric one.
+constexpr double kFarApart = 4.;
 constexpr int kMaximalCuts = 40, kMaximalSteps = 60;
 // What part of the largest pivot of the compliance the least must be for a step without slack.
 constexpr double kFullRank = 1e-9;
-constexpr int kFreeSteps = 12;
+constexpr int kFreeSteps = 3;
 // The slack of the proximal point method, over the mean compliance: the first, the least, by which
 // it falls where the residual falls less than fivefold, and how many.
 constexpr double kFirstSlack = 1e-3, kLeastSlack = 1e-14, kSlackFactor = 0.05, kFall = 0.2;
@@ -66,10 +68,12 @@ Matrix3d skew(const Vector3d& v) {
 
 struct Block {
   int size = 3;
+  bool is_described = false;
   Matrix3d rotation;
   Vector3d lever;
-  Vector6 inverse_weights;  // W⁻¹ times the largest weight of all
-  Vector6 reference;        // W λ₀ over the unit
+  Vector6 weights, inverse_weights;  // W over the largest weight of all
+  ContactSet described;              // what `set` is made of
+  Vector6 reference;                 // W λ₀ over the unit
   ScaledSet set, face;
   Vector6 pull;  // what the projection is of
   ScaledSet::Response response;
@@ -197,7 +201,8 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
     const Eigen::VectorXd pull = NE.transpose() * direction;
     const Eigen::VectorXd gradient =
         weights.cwiseAbs2().cwiseProduct(force - reference) - NE.transpose() * multipliers;
-    ScaledSet face(contact.set, Eigen::VectorXd::Ones(n), 1.);
+    ScaledSet face(contact.set, Vector6::Ones());
+    face.setUnit(contact.set, Vector6::Ones(), 1.);
     Vector6 own = Vector6::Zero(), against = Vector6::Zero(), at = Vector6::Zero();
     own.head(n) = pull;
     against.head(n) = -gradient;
@@ -271,14 +276,22 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
     block.size = int(n);
     block.rotation = contact.rotation;
     block.lever = contact.lever;
-    Eigen::VectorXd own = contact.weights.size() > 0 ? Eigen::VectorXd(contact.weights / largest)
-                                                     : Eigen::VectorXd::Constant(n, 1. / largest);
-    block.inverse_weights.setOnes();
-    block.inverse_weights.head(n) = own.cwiseInverse();
+    Vector6 own = Vector6::Ones();
+    if (contact.weights.size() > 0)
+      own.head(n) = contact.weights / largest;
+    else
+      own.head(n) /= largest;
+    if (!block.is_described || block.weights != own || block.described != contact.set) {
+      block.weights = own;
+      block.inverse_weights = own.cwiseInverse();
+      block.described = contact.set;
+      block.set = ScaledSet(contact.set, own);
+      block.is_described = true;
+    }
+    block.set.setUnit(contact.set, own, unit);
     block.reference.setZero();
     if (contact.reference.size() > 0)
-      block.reference.head(n) = contact.reference.cwiseProduct(own) / unit;
-    block.set = ScaledSet(contact.set, own, unit);
+      block.reference.head(n) = contact.reference.cwiseProduct(own.head(n)) / unit;
     for (int i = 0; i < int(n); ++i)
       mean_compliance += weights.cwiseProduct(block.wrenchOf(Vector6::Unit(i))).squaredNorm() / 6.;
   }
@@ -322,9 +335,13 @@ void DistributionSolver::Workspace::assemble(double slack) {
 // hand. Returns whether it is there; without slack also false where some wrenches are hardly given.
 bool DistributionSolver::Workspace::descend(Which which, double slack, const Vector6& centre,
                                             int steps) {
+  double former = std::numeric_limits<double>::infinity();
   for (int step = 0; iterations < maximal_iterations; ++step) {
     const Vector6 gradient = slack * (multipliers - centre) - missing();
-    if (gradient.norm() <= enough()) return true;
+    const double size = gradient.norm();
+    // What no step makes smaller, and is small, is rounding.
+    if (size <= enough() || (size <= kMissing && size > 0.5 * former)) return true;
+    former = size;
     if (step == steps) return false;
     ++iterations;
     assemble(slack);
@@ -353,7 +370,8 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
       if (cut % 2 == 0)
         length = lower + (upper - lower) * lower_slope / (lower_slope - upper_slope);
       else
-        length = 0.5 * (lower + upper);
+        length = upper > kFarApart * lower && lower > 0. ? std::sqrt(lower * upper)
+                                                         : 0.5 * (lower + upper);
     }
   }
   return false;
@@ -481,8 +499,11 @@ bool DistributionSolver::Workspace::findResidual(Vector6& residual) {
     const Eigen::PartialPivLU<Matrix6> lu(jacobian);
     residual += lu.solve(rest - residual);  // but for what faces make up for
     if (rank > 0) {
-      const Eigen::MatrixXd bent = lu.solve(spanned);
-      residual -= bent * (spanned.transpose() * bent).ldlt().solve(spanned.transpose() * residual);
+      using Spanned = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
+      using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+      const Spanned bent = lu.solve(spanned);
+      const Eigen::LDLT<Square> along(Square(spanned.transpose() * bent));
+      residual -= bent * along.solve(spanned.transpose() * residual);
     }
     is_found = (residual - former).norm() <= kMissing;
   }

@@ -18,6 +18,11 @@ constexpr int kNormalSteps = 60, kEllipseSteps = 60;
 // What is rounding of a sum, over its terms.
 constexpr double kRounding = 4. * std::numeric_limits<double>::epsilon();
 
+// The normal of an edge, of length 1.
+Vector2d findOutward(const Vector2d& first, const Vector2d& last) {
+  return Vector2d(last.y() - first.y(), first.x() - last.x()).normalized();
+}
+
 // A number limited to an interval that is z times as large, and what that means.
 struct Limited {
   double value, by_value, by_normal, push;
@@ -40,18 +45,32 @@ ScaledSection::ScaledSection(const Section& section, const Vector2d& scale)
       shape_ = scale.x() == scale.y() ? Shape::Disc : Shape::Ellipse;
       radii_ = section.radius() * scale;
       break;
-    case Section::Shape::Polygon:
-      shape_ = Shape::Polygon;
-      vertices_ = scale.asDiagonal() * section.vertices();
-      normals_.resize(2, vertices_.cols());
-      offsets_.resize(vertices_.cols());
-      for (Index k = 0; k < vertices_.cols(); ++k) {
-        const Vector2d edge = vertices_.col((k + 1) % vertices_.cols()) - vertices_.col(k);
-        normals_.col(k) = Vector2d(edge.y(), -edge.x()).normalized();
-        offsets_[k] = normals_.col(k).dot(vertices_.col(k));
+    case Section::Shape::Polygon: {
+      const Eigen::Matrix2Xd vertices = scale.asDiagonal() * section.vertices();
+      const Index count = vertices.cols();
+      if (count == 2) {
+        *this = segment(vertices.col(0), vertices.col(1));
+        break;
       }
+      shape_ = Shape::Polygon;
+      const auto polygon = std::make_shared<Polygon>();
+      polygon->normals.resize(2, count);
+      for (Index k = 0; k < count; ++k)
+        polygon->normals.col(k) = findOutward(vertices.col(k), vertices.col((k + 1) % count));
+      polygon->offsets = polygon->normals.cwiseProduct(vertices).colwise().sum();
+      polygon->vertices = vertices;
+      polygon_ = polygon;
       break;
+    }
   }
+}
+
+ScaledSection ScaledSection::segment(const Vector2d& first, const Vector2d& last) {
+  ScaledSection segment;
+  segment.shape_ = Shape::Segment;
+  segment.lower_ = first;
+  segment.upper_ = last;
+  return segment;
 }
 
 void ScaledSection::project(const Vector2d& point, double normal, Response& response) const {
@@ -88,6 +107,9 @@ void ScaledSection::project(const Vector2d& point, double normal, Response& resp
       if (point.cwiseQuotient(radii_).norm() <= normal) break;
       projectOnEllipse(point, normal, response);
       return;
+    case Shape::Segment:
+      projectOnSegment(point, normal, response);
+      return;
     case Shape::Polygon:
       projectOnPolygon(point, normal, response);
       return;
@@ -122,40 +144,39 @@ void ScaledSection::projectOnEllipse(const Vector2d& point, double normal,
   response.stiffening = (response.by_normal.dot(point) - response.push) / normal;
 }
 
-// On the nearest of the edges beyond which the point is, or at its end.
+void ScaledSection::projectOnSegment(const Vector2d& point, double normal,
+                                     Response& response) const {
+  const Vector2d outward = findOutward(lower_, upper_), along(-outward.y(), outward.x());
+  const double place = along.dot(point);
+  const bool is_before = place <= normal * along.dot(lower_);
+  if (is_before || place >= normal * along.dot(upper_)) {
+    const Vector2d& end = is_before ? lower_ : upper_;
+    response = {normal * end, Matrix2d::Zero(), end, (point - normal * end).dot(end),
+                end.squaredNorm()};
+    return;
+  }
+  const double offset = outward.dot(lower_);
+  response = {place * along + normal * offset * outward, along * along.transpose(),
+              offset * outward, (outward.dot(point) - normal * offset) * offset, offset * offset};
+}
+
+// On the nearest of the edges beyond which the point is.
 void ScaledSection::projectOnPolygon(const Vector2d& point, double normal,
                                      Response& response) const {
-  const Index count = vertices_.cols();
+  const Polygon& polygon = *polygon_;
+  const Index count = polygon.vertices.cols();
   double nearest = std::numeric_limits<double>::infinity();
-  bool is_inside = count > 2;
+  Response on_edge;
+  response = {point, Matrix2d::Identity(), Vector2d::Zero(), 0., 0.};
   for (Index k = 0; k < count; ++k) {
-    const Vector2d outward = normals_.col(k);
-    const double beyond = outward.dot(point) - normal * offsets_[k];
-    if (count > 2 && beyond <= 0.) continue;
-    is_inside = false;
-    const Vector2d along(-outward.y(), outward.x());
-    const Vector2d first = vertices_.col(k), last = vertices_.col((k + 1) % count);
-    const double from = normal * along.dot(first), to = normal * along.dot(last);
-    const double place = along.dot(point);
-    if (place > from && place < to) {
-      if (beyond * beyond >= nearest) continue;
-      nearest = beyond * beyond;
-      const double offset = offsets_[k];
-      response.point = place * along + normal * offset * outward;
-      response.by_point = along * along.transpose();
-      response.by_normal = offset * outward;
-      response.push = beyond * offset;
-      response.stiffening = offset * offset;
-    } else {
-      const Vector2d& vertex = place <= from ? first : last;
-      const double distance = (point - normal * vertex).squaredNorm();
-      if (distance >= nearest) continue;
-      nearest = distance;
-      response = {normal * vertex, Matrix2d::Zero(), vertex, (point - normal * vertex).dot(vertex),
-                  vertex.squaredNorm()};
-    }
+    if (polygon.normals.col(k).dot(point) <= normal * polygon.offsets[k]) continue;
+    segment(polygon.vertices.col(k), polygon.vertices.col((k + 1) % count))
+        .projectOnSegment(point, normal, on_edge);
+    const double distance = (point - on_edge.point).squaredNorm();
+    if (distance >= nearest) continue;
+    nearest = distance;
+    response = on_edge;
   }
-  if (is_inside) response = {point, Matrix2d::Identity(), Vector2d::Zero(), 0., 0.};
 }
 
 // A point that is as far as any in a direction.
@@ -169,12 +190,14 @@ Vector2d ScaledSection::findExposed(const Vector2d& direction) const {
       const double size = stretched.norm();
       return size > 0. ? Vector2d(radii_.cwiseProduct(stretched) / size) : Vector2d::Zero();
     }
+    case Shape::Segment:
+      return direction.dot(upper_ - lower_) > 0. ? upper_ : lower_;
     case Shape::Polygon:
       break;
   }
   Index farthest = 0;
-  (direction.transpose() * vertices_).maxCoeff(&farthest);
-  return vertices_.col(farthest);
+  (direction.transpose() * polygon_->vertices).maxCoeff(&farthest);
+  return polygon_->vertices.col(farthest);
 }
 
 double ScaledSection::support(const Vector2d& direction) const {
@@ -189,28 +212,20 @@ ScaledSection ScaledSection::expose(const Vector2d& direction, double tolerance)
     return face;
   }
   if (direction.norm() <= tolerance) return *this;
-  face.lower_ = face.upper_ = findExposed(direction);
-  if (shape_ != Shape::Polygon) return face;
-  // An edge whose ends are as far.
-  const Index count = vertices_.cols();
-  for (Index k = 0; k < count; ++k) {
-    const Vector2d along = vertices_.col((k + 1) % count) - vertices_.col(k);
-    if (std::abs(direction.dot(along)) <= tolerance * along.norm() &&
-        direction.dot(normals_.col(k)) > 0.)
-      return edge(k);
+  const auto areAsFar = [&](const Vector2d& first, const Vector2d& last) {
+    return std::abs(direction.dot(last - first)) <= tolerance * (last - first).norm();
+  };
+  if (shape_ == Shape::Segment && areAsFar(lower_, upper_)) return *this;
+  if (shape_ == Shape::Polygon) {
+    const Eigen::Matrix2Xd& vertices = polygon_->vertices;
+    for (Index k = 0; k < vertices.cols(); ++k) {
+      const Vector2d first = vertices.col(k), last = vertices.col((k + 1) % vertices.cols());
+      if (areAsFar(first, last) && direction.dot(polygon_->normals.col(k)) > 0.)
+        return segment(first, last);
+    }
   }
+  face.lower_ = face.upper_ = findExposed(direction);
   return face;
-}
-
-ScaledSection ScaledSection::edge(Index k) const {
-  ScaledSection edge;
-  edge.shape_ = Shape::Polygon;
-  edge.vertices_.resize(2, 2);
-  edge.vertices_ << vertices_.col(k), vertices_.col((k + 1) % vertices_.cols());
-  edge.normals_.resize(2, 2);
-  edge.normals_ << normals_.col(k), -normals_.col(k);
-  edge.offsets_ = Vector2d(offsets_[k], -offsets_[k]);
-  return edge;
 }
 
 ScaledSection ScaledSection::hold(const Vector2d& point, const Matrix2d& by_point, double normal,
@@ -224,12 +239,16 @@ ScaledSection ScaledSection::hold(const Vector2d& point, const Matrix2d& by_poin
     return face;
   }
   if (by_point.isIdentity(0.)) return *this;
-  if (shape_ == Shape::Polygon) {
+  if (shape_ == Shape::Segment || shape_ == Shape::Polygon) {
     face.lower_ = face.upper_ = point / normal;
     if (by_point.isZero(0.)) return face;
+    if (shape_ == Shape::Segment) return *this;
     Index nearest = 0;
-    (normals_.transpose() * point - normal * offsets_).cwiseAbs().minCoeff(&nearest);
-    return edge(nearest);
+    (polygon_->normals.transpose() * point - normal * polygon_->offsets)
+        .cwiseAbs()
+        .minCoeff(&nearest);
+    const Eigen::Matrix2Xd& vertices = polygon_->vertices;
+    return segment(vertices.col(nearest), vertices.col((nearest + 1) % vertices.cols()));
   }
   face.lower_ = face.upper_ = findExposed(direction);
   const double size = radii_.cwiseProduct(direction).norm();
@@ -248,13 +267,13 @@ ScaledSection::Span ScaledSection::span() const {
       if (lower_.x() < upper_.x()) add(Vector2d::UnitX());
       if (lower_.y() < upper_.y()) add(Vector2d::UnitY());
       break;
+    case Shape::Segment: {
+      const Vector2d outward = findOutward(lower_, upper_);
+      span.offset = outward.dot(lower_) * outward;
+      add(Vector2d(-outward.y(), outward.x()));
+      break;
+    }
     case Shape::Polygon:
-      if (vertices_.cols() == 2) {
-        span.offset = offsets_[0] * normals_.col(0);
-        add(Vector2d(-normals_(1, 0), normals_(0, 0)));
-        break;
-      }
-      [[fallthrough]];
     case Shape::Disc:
     case Shape::Ellipse:
       add(Vector2d::UnitX());
@@ -264,15 +283,18 @@ ScaledSection::Span ScaledSection::span() const {
   return span;
 }
 
-ScaledSet::ScaledSet(const ContactSet& set, const Eigen::VectorXd& weights, double unit)
+ScaledSet::ScaledSet(const ContactSet& set, const Vector6& weights)
     : is_grasp_(set.kind() == ContactSet::Kind::Grasp), size_(int(set.size())) {
-  lower_.head(size_) = set.lower().head(size_).cwiseProduct(weights) / unit;
-  upper_.head(size_) = set.upper().head(size_).cwiseProduct(weights) / unit;
   if (is_grasp_) return;
   friction_ = ScaledSection(set.friction(), weights.head<2>() / weights[kNormal]);
   if (size_ == 3) return;
   moments_ = ScaledSection(set.moments(), weights.segment<2>(3) / weights[kNormal]);
   yaw_ = set.gamma() * weights[kYaw] / weights[kNormal] * Vector2d(-1., 1.);
+}
+
+void ScaledSet::setUnit(const ContactSet& set, const Vector6& weights, double unit) {
+  lower_.head(size_) = set.lower().cwiseProduct(weights).head(size_) / unit;
+  upper_.head(size_) = set.upper().cwiseProduct(weights).head(size_) / unit;
 }
 
 void ScaledSet::projectAt(const Vector6& point, double normal, Parts& parts) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 
 #include "dynacom/contact_set.hpp"
 
@@ -52,19 +53,23 @@ class ScaledSection {
   Span span() const;
 
  private:
-  enum class Shape { Box, Disc, Ellipse, Polygon };
+  enum class Shape { Box, Disc, Ellipse, Segment, Polygon };
+  /// Vertices, and of the edges that begin there outward normals of length 1, and how far they are
+  /// from the origin.
+  struct Polygon {
+    Eigen::Matrix2Xd vertices, normals;
+    Eigen::VectorXd offsets;
+  };
+  static ScaledSection segment(const Vector2& first, const Vector2& last);
+  void projectOnSegment(const Vector2& point, double normal, Response& response) const;
   void projectOnEllipse(const Vector2& point, double normal, Response& response) const;
   void projectOnPolygon(const Vector2& point, double normal, Response& response) const;
   Vector2 findExposed(const Vector2& direction) const;
-  ScaledSection edge(Eigen::Index k) const;
 
   Shape shape_ = Shape::Box;
-  Vector2 lower_ = Vector2::Zero(), upper_ = Vector2::Zero();  // of a box; of the others unused
+  Vector2 lower_ = Vector2::Zero(), upper_ = Vector2::Zero();  // of a box; ends of a segment
   Vector2 radii_ = Vector2::Zero();
-  // Of a polygon: vertices, and of the edges that begin there outward normals of length 1, and how
-  // far they are from the origin.
-  Eigen::Matrix2Xd vertices_ = Eigen::Matrix2Xd(2, 0), normals_ = Eigen::Matrix2Xd(2, 0);
-  Eigen::VectorXd offsets_;
+  std::shared_ptr<const Polygon> polygon_;  // copies of this allocate nothing
 };
 
 /// The set of a contact's forces in the coordinates x = W λ of the cost.
@@ -90,11 +95,13 @@ class ScaledSet {
   };
 
   ScaledSet() = default;
-  /// @param weights  W, 3 or 6
-  /// @param unit     of forces, which those of the set are divided by [N]
-  ScaledSet(const ContactSet& set, const Eigen::VectorXd& weights, double unit);
+  /// @param weights  W; of points the first three count
+  ScaledSet(const ContactSet& set, const Vector6& weights);
 
-  int size() const { return size_; }
+  /// Takes bounds anew.
+  /// @param set, weights  of the constructor
+  /// @param unit          of forces, which those of the set are divided by [N]
+  void setUnit(const ContactSet& set, const Vector6& weights, double unit);
 
   /// @param point  six components, of points the first three
   void project(const Vector6& point, Response& response) const;
