@@ -46,8 +46,9 @@ constexpr int kFreeSteps = 3;
 // it falls where the residual falls less than fivefold, and how many.
 constexpr double kFirstSlack = 1e-3, kLeastSlack = 1e-14, kSlackFactor = 0.05, kFall = 0.2;
 constexpr int kMaximalRounds = 40;
-// On faces.
+// On faces, and how often it may fall there until the faces are the wrong ones.
 constexpr double kFaceSlack = 1e-5;
+constexpr int kSlowRounds = 4;
 // Of a direction that faces span, what remains outside of the others: more than the first, it is
 // one of its own, less than the second, it is rounding.
 constexpr double kIndependent = 1e-6, kDependent = 1e-11;
@@ -353,12 +354,19 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
     const Vector6 start = multipliers;
     const auto costOf = [&] { return value + 0.5 * slack * (multipliers - centre).squaredNorm(); };
     const double cost = costOf();
+    // Where the dual has no digits for what the step promises, the gradient has.
+    const bool is_local = -slope <= kRounding * std::abs(cost);
     double length = 1., lower = 0., upper = 1., lower_slope = slope, upper_slope = 0.;
     for (int cut = 0;; ++cut) {
       if (cut == kMaximalCuts) return false;
       evaluate(start + length * direction, which);
       const Vector6 residual = slack * (multipliers - centre) - missing();
       if (residual.norm() <= enough()) return true;
+      if (is_local) {
+        if (residual.norm() < size) break;
+        evaluate(start, which);
+        return false;
+      }
       const double end_slope = residual.dot(direction);
       const bool descends = end_slope <= 0.;
       if ((descends && cut == 0) || (descends && -end_slope <= -kFlat * slope) ||
@@ -531,12 +539,14 @@ bool DistributionSolver::Workspace::relax(const Vector6& guess) {
   may_lack = 0.;
   Vector6 centre = start;
   double slack = kFaceSlack * mean_compliance, former = missing().norm();
-  for (int round = 0; round < kMaximalRounds && iterations < maximal_iterations; ++round) {
+  for (int slow = 0; slow < kSlowRounds && iterations < maximal_iterations;) {
     descend(&Block::face, slack, centre, kMaximalSteps);
     const double size = missing().norm();
     if (size <= enough() || (size <= kMissing && size > 0.5 * former)) break;
-    if (size > kFall * former)
+    if (size > kFall * former) {
+      ++slow;
       slack = std::max(slack * kSlackFactor, kLeastSlack * mean_compliance);
+    }
     former = size;
     centre = multipliers;
   }
