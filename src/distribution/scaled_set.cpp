@@ -15,6 +15,8 @@ namespace {
 constexpr int kNormal = 2, kYaw = 5;
 // Of Newton's method for a normal force, and on an ellipse: far more than any has taken.
 constexpr int kNormalSteps = 60, kEllipseSteps = 60;
+// A point is so close to a curved boundary, over its radius, if it is not far beyond.
+constexpr double kHeldByCost = 0.05;
 // What is rounding of a sum, over its terms.
 constexpr double kRounding = 4. * std::numeric_limits<double>::epsilon();
 
@@ -250,6 +252,8 @@ ScaledSection ScaledSection::hold(const Vector2d& point, const Matrix2d& by_poin
     const Eigen::Matrix2Xd& vertices = polygon_->vertices;
     return segment(vertices.col(nearest), vertices.col((nearest + 1) % vertices.cols()));
   }
+  // Held by what it costs, and not by the direction, which is far beyond.
+  if (by_point.trace() > kHeldByCost) return *this;
   face.lower_ = face.upper_ = findExposed(direction);
   const double size = radii_.cwiseProduct(direction).norm();
   if (size > 0.)
