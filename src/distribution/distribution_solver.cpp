@@ -209,7 +209,9 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
     against.head(n) = -gradient;
     at.head(n) = force;
     if (relaxed) {
-      const double rounding = tolerance * direction.norm() * std::max(1., contact.lever.norm());
+      // Components of the residual that expose a face are more than it may be off.
+      const double rounding = std::max(kExposed, 10. * kMissing * scale / size) * direction.norm() *
+                              std::max(1., contact.lever.norm());
       distance_gap += std::max(0., face.support(own, rounding) - own.dot(at));
       ScaledSet exposed;
       if (!face.expose(own, rounding, exposed)) return false;
@@ -266,6 +268,7 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
   weights = problem.wrench_weights / overall_weight;
   target = weights.cwiseProduct(problem.wrench) / unit;
   blocks.resize(problem.contacts.size());
+  directions.reserve(6 * blocks.size());
   double largest = 0.;
   for (const auto& contact : problem.contacts)
     largest = std::max(largest, contact.weights.size() > 0 ? contact.weights.maxCoeff() : 1.);
@@ -286,7 +289,7 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
       block.weights = own;
       block.inverse_weights = own.cwiseInverse();
       block.described = contact.set;
-      block.set = ScaledSet(contact.set, own);
+      block.set = block.face = ScaledSet(contact.set, own);
       block.is_described = true;
     }
     block.set.setUnit(contact.set, own, unit);

@@ -197,9 +197,11 @@ Vector2d ScaledSection::findExposed(const Vector2d& direction) const {
     case Shape::Polygon:
       break;
   }
+  const Eigen::Matrix2Xd& vertices = polygon_->vertices;
   Index farthest = 0;
-  (direction.transpose() * polygon_->vertices).maxCoeff(&farthest);
-  return polygon_->vertices.col(farthest);
+  for (Index k = 1; k < vertices.cols(); ++k)
+    if (direction.dot(vertices.col(k) - vertices.col(farthest)) > 0.) farthest = k;
+  return vertices.col(farthest);
 }
 
 double ScaledSection::support(const Vector2d& direction) const {
@@ -245,10 +247,12 @@ ScaledSection ScaledSection::hold(const Vector2d& point, const Matrix2d& by_poin
     face.lower_ = face.upper_ = point / normal;
     if (by_point.isZero(0.)) return face;
     if (shape_ == Shape::Segment) return *this;
+    const auto findOff = [&](Index k) {
+      return std::abs(polygon_->normals.col(k).dot(point) - normal * polygon_->offsets[k]);
+    };
     Index nearest = 0;
-    (polygon_->normals.transpose() * point - normal * polygon_->offsets)
-        .cwiseAbs()
-        .minCoeff(&nearest);
+    for (Index k = 1; k < polygon_->offsets.size(); ++k)
+      if (findOff(k) < findOff(nearest)) nearest = k;
     const Eigen::Matrix2Xd& vertices = polygon_->vertices;
     return segment(vertices.col(nearest), vertices.col((nearest + 1) % vertices.cols()));
   }
