@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "dynacom/contact_set.hpp"
+#include "dynacom/distribution_status.hpp"
 #include "dynacom/export.hpp"
-#include "dynacom/wrench_distribution.hpp"
 
 namespace dynacom {
 
@@ -81,14 +81,19 @@ class DYNACOM_EXPORT DistributionSolver {
   DistributionSolver& operator=(DistributionSolver other) noexcept;
   ~DistributionSolver();
 
-  /// Steps of Newton's method that a problem may take, WrenchDistribution::kMaximalIterations by
-  /// default.
+  /// How many steps of Newton's method a problem may take unless setMaximalIterations() says
+  /// otherwise.
+  static constexpr int kMaximalIterations = 100000;
+
   /// @throws std::invalid_argument unless > 0
   void setMaximalIterations(int maximal_iterations);
 
   /// Whether the search begins with the multipliers of the last answer, as is the default, if it
   /// was for as many contacts.
   void setWarmStart(bool warm_start);
+
+  /// Forgets the last answer: what comes next does not depend on it.
+  void forget();
 
   /// @param problem  whose validate() would not throw; that is not looked at here
   /// @return the answer, until the next call; InvalidInput if a wrench or a placement is not finite

@@ -229,7 +229,7 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
 }
 
 struct DistributionSolver::Workspace {
-  int maximal_iterations = WrenchDistribution::kMaximalIterations;
+  int maximal_iterations = kMaximalIterations;
   bool warm_start = true, has_answer = false;
   DistributionSolution solution;
   std::vector<Block> blocks;
@@ -587,6 +587,8 @@ void DistributionSolver::setMaximalIterations(int maximal_iterations) {
 }
 
 void DistributionSolver::setWarmStart(bool warm_start) { work_->warm_start = warm_start; }
+
+void DistributionSolver::forget() { work_->has_answer = false; }
 
 const DistributionSolution& DistributionSolver::solve(const DistributionProblem& problem) {
   Workspace& work = *work_;
