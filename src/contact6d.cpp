@@ -5,6 +5,8 @@
 #include <ostream>
 
 #include "check.hpp"
+#include "surface_matrices.hpp"
+#include "surface_options.hpp"
 
 namespace dynacom {
 
@@ -19,22 +21,29 @@ void Contact6DSettings::validate() const {
                "finite and >= 0", half_width);
   requireField(weights.allFinite() && (weights.array() > 0.).all(), "Contact6DSettings.weights",
                "finite and > 0", weights.transpose());
+  requireField(reference.allFinite(), "Contact6DSettings.reference", "finite",
+               reference.transpose());
+  internal::validate(*this, "Contact6DSettings");
   requireField(!frame_name.empty(), "Contact6DSettings.frame_name", "a frame's name", "''");
 }
 
 std::string Contact6DSettings::to_string() const { return internal::concat(*this); }
 
 bool Contact6DSettings::operator==(const Contact6DSettings& other) const {
-  return mu == other.mu && gu == other.gu && half_length == other.half_length &&
-         half_width == other.half_width && weights == other.weights &&
-         frame_name == other.frame_name;
+  return SurfaceOptions::operator==(other) && reference == other.reference && mu == other.mu &&
+         gu == other.gu && half_length == other.half_length && half_width == other.half_width &&
+         weights == other.weights && frame_name == other.frame_name;
 }
 
 std::ostream& operator<<(std::ostream& out, const Contact6DSettings& settings) {
-  return out << "Contact6DSettings(mu=" << settings.mu << ", gu=" << settings.gu
-             << ", half_length=" << settings.half_length << ", half_width=" << settings.half_width
-             << ", weights=[" << settings.weights.transpose() << "], frame_name='"
-             << settings.frame_name << "')";
+  out << "Contact6DSettings(mu=" << settings.mu << ", gu=" << settings.gu
+      << ", half_length=" << settings.half_length << ", half_width=" << settings.half_width
+      << ", weights=[" << settings.weights.transpose() << "], frame_name='" << settings.frame_name
+      << "'";
+  internal::write(out, settings);
+  if (!settings.reference.isZero(0.))
+    out << ", reference=[" << settings.reference.transpose() << "]";
+  return out << ")";
 }
 
 Contact6D::Contact6D(const Contact6DSettings& settings) { initialize(settings); }
@@ -48,6 +57,8 @@ void Contact6D::initialize(const Contact6DSettings& settings) {
 
 std::shared_ptr<ContactBase> Contact6D::clone() const { return std::make_shared<Contact6D>(*this); }
 
+ContactBase::SE3 Contact6D::getSurfacePose() const { return getPose() * settings_.placement; }
+
 Eigen::Matrix2Xd Contact6D::getCorners() const {
   const double dx = settings_.half_length, dy = settings_.half_width;
   Eigen::Matrix2Xd corners(2, 4);
@@ -58,7 +69,7 @@ Eigen::Matrix2Xd Contact6D::getCorners() const {
 
 double Contact6D::getFrictionUsage() const {
   if (cols() == 0) return ContactBase::getFrictionUsage();
-  return getUsage(appliedForce().head<2>().lpNorm<Eigen::Infinity>(), settings_.mu);
+  return getUsage(settings_.findTangential(appliedForce().head<2>()), settings_.mu);
 }
 
 double Contact6D::getCoPMargin() const {
@@ -103,24 +114,16 @@ void Contact6D::change(Value Contact6DSettings::*field, const Value& value) {
 }
 
 void Contact6D::updateMatrices() {
-  const double dx = settings_.half_length;
-  const double dy = settings_.half_width;
-  Eigen::Matrix<double, 5, 6> uni_A;
-  uni_A << 0., 0., -1., 0., 0., 0.,  //
-      0., 0., -dx, 0., -1., 0.,      //
-      0., 0., -dy, 1., 0., 0.,       //
-      0., 0., -dx, 0., 1., 0.,       //
-      0., 0., -dy, -1., 0., 0.;
-  const double mu = settings_.mu;
-  const double gu = settings_.gu;
-  Eigen::Matrix<double, 6, 6> fri_A;
-  fri_A << 1., 0., -mu, 0., 0., 0.,  //
-      0., 1., -mu, 0., 0., 0.,       //
-      -1., 0., -mu, 0., 0., 0.,      //
-      0., -1., -mu, 0., 0., 0.,      //
-      0., 0., -gu, 0., 0., 1.,       //
-      0., 0., -gu, 0., 0., -1.;
-  setMatrices(uni_A, fri_A, settings_.weights);
+  const Eigen::Vector2d half(settings_.half_length, settings_.half_width);
+  const Section places = Section::rectangle(-half, half);
+  ContactSet set = ContactSet::surface(settings_.makeFriction(settings_.mu), places, settings_.gu);
+  set.boundNormalForce(settings_.least_normal_force, settings_.greatest_normal_force);
+  const internal::SurfaceMatrices matrices = internal::listInequalities(set, &places);
+  if (internal::isPyramid(set) && settings_.reference.isZero(0.))
+    setMatrices(matrices.uni_A, matrices.fri_A, settings_.weights);
+  else
+    setMatrices(matrices.uni_A, matrices.uni_b, matrices.fri_A, matrices.fri_b, settings_.weights,
+                settings_.reference, set);
 }
 
 }  // namespace dynacom

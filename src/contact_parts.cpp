@@ -14,6 +14,7 @@
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "nan.hpp"
+#include "surface_options.hpp"
 
 namespace dynacom {
 
@@ -277,10 +278,19 @@ internal::ContactSplit internal::splitCarrier(const DynaCoM& robot,
   points.clear();
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const FixedContact& whole = contacts[k];
-    if (dynamic_cast<const ContactPoint*>(whole.contact.get())) {
+    const auto requirePlain = [&](const auto& contact) {
+      if (contact.getSet() || !isPlain(contact.getSettings()))
+        throwInvalid("contact '", whole.name,
+                     "' must be an outer pyramid at its frame, without bounds and reference, to be "
+                     "taken apart, got ",
+                     contact.getSettings());
+    };
+    if (const auto* point = dynamic_cast<const ContactPoint*>(whole.contact.get())) {
+      requirePlain(*point);
       split.parts.push_back({whole.name, k, 0});
       points.push_back(whole);
     } else if (const auto* surface = dynamic_cast<const Contact6D*>(whole.contact.get())) {
+      requirePlain(*surface);
       const Eigen::Matrix2Xd corners = surface->getCorners();
       ContactPointSettings part;
       part.mu = surface->getSettings().mu;

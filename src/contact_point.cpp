@@ -5,6 +5,8 @@
 #include <ostream>
 
 #include "check.hpp"
+#include "surface_matrices.hpp"
+#include "surface_options.hpp"
 
 namespace dynacom {
 
@@ -14,6 +16,9 @@ void ContactPointSettings::validate() const {
   requireField(std::isfinite(mu) && mu >= 0., "ContactPointSettings.mu", "finite and >= 0", mu);
   requireField(weights.allFinite() && (weights.array() > 0.).all(), "ContactPointSettings.weights",
                "finite and > 0", weights.transpose());
+  requireField(reference.allFinite(), "ContactPointSettings.reference", "finite",
+               reference.transpose());
+  internal::validate(*this, "ContactPointSettings");
   requireField(!frame_name.empty(), "ContactPointSettings.frame_name", "a frame's name", "''");
   requireField(std::isfinite(radius) && radius >= 0., "ContactPointSettings.radius",
                "finite and >= 0", radius);
@@ -22,15 +27,20 @@ void ContactPointSettings::validate() const {
 std::string ContactPointSettings::to_string() const { return internal::concat(*this); }
 
 bool ContactPointSettings::operator==(const ContactPointSettings& other) const {
-  return mu == other.mu && weights == other.weights && frame_name == other.frame_name &&
+  return SurfaceOptions::operator==(other) && reference == other.reference && mu == other.mu &&
+         weights == other.weights && frame_name == other.frame_name &&
          world_aligned == other.world_aligned && radius == other.radius;
 }
 
 std::ostream& operator<<(std::ostream& out, const ContactPointSettings& settings) {
-  return out << "ContactPointSettings(mu=" << settings.mu << ", weights=["
-             << settings.weights.transpose() << "], frame_name='" << settings.frame_name
-             << "', world_aligned=" << (settings.world_aligned ? "true" : "false")
-             << ", radius=" << settings.radius << ")";
+  out << "ContactPointSettings(mu=" << settings.mu << ", weights=[" << settings.weights.transpose()
+      << "], frame_name='" << settings.frame_name
+      << "', world_aligned=" << (settings.world_aligned ? "true" : "false")
+      << ", radius=" << settings.radius;
+  internal::write(out, settings);
+  if (!settings.reference.isZero(0.))
+    out << ", reference=[" << settings.reference.transpose() << "]";
+  return out << ")";
 }
 
 ContactPoint::ContactPoint(const ContactPointSettings& settings) { initialize(settings); }
@@ -47,7 +57,7 @@ std::shared_ptr<ContactBase> ContactPoint::clone() const {
 }
 
 ContactBase::SE3 ContactPoint::getSurfacePose() const {
-  SE3 surface = getPose();
+  SE3 surface = getPose() * settings_.placement;
   if (settings_.world_aligned) surface.rotation().setIdentity();
   surface.translation() -= settings_.radius * surface.rotation().col(2);
   return surface;
@@ -55,7 +65,7 @@ ContactBase::SE3 ContactPoint::getSurfacePose() const {
 
 double ContactPoint::getFrictionUsage() const {
   if (cols() == 0) return ContactBase::getFrictionUsage();
-  return getUsage(appliedForce().head<2>().lpNorm<Eigen::Infinity>(), settings_.mu);
+  return getUsage(settings_.findTangential(appliedForce().head<2>()), settings_.mu);
 }
 
 void ContactPoint::setMu(double mu) { change(&ContactPointSettings::mu, mu); }
@@ -72,14 +82,14 @@ void ContactPoint::change(Value ContactPointSettings::*field, const Value& value
 }
 
 void ContactPoint::updateMatrices() {
-  const double mu = settings_.mu;
-  const Eigen::RowVector3d uni_A(0., 0., -1.);
-  Eigen::Matrix<double, 4, 3> fri_A;
-  fri_A << 1., 0., -mu,  //
-      0., 1., -mu,       //
-      -1., 0., -mu,      //
-      0., -1., -mu;
-  setMatrices(uni_A, fri_A, settings_.weights);
+  ContactSet set = ContactSet::point(settings_.makeFriction(settings_.mu));
+  set.boundNormalForce(settings_.least_normal_force, settings_.greatest_normal_force);
+  const internal::SurfaceMatrices matrices = internal::listInequalities(set, nullptr);
+  if (internal::isPyramid(set) && settings_.reference.isZero(0.))
+    setMatrices(matrices.uni_A, matrices.fri_A, settings_.weights);
+  else
+    setMatrices(matrices.uni_A, matrices.uni_b, matrices.fri_A, matrices.fri_b, settings_.weights,
+                settings_.reference, set);
 }
 
 }  // namespace dynacom

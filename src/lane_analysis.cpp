@@ -10,6 +10,7 @@
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "standard_gravity.hpp"
+#include "surface_options.hpp"
 #ifdef DYNACOM_HAS_LANES
 #include <dlfcn.h>
 #endif
@@ -124,14 +125,15 @@ void write(const pinocchio::SE3& placement, double* numbers) {
   Vector3::Map(numbers + 9) = placement.translation();
 }
 
-// The contacts that lanes know.
-const Contact6D* asSurface(const ContactBase& contact) {
-  return typeid(contact) == typeid(Contact6D) ? static_cast<const Contact6D*>(&contact) : nullptr;
+// The contacts that lanes know: pyramids at their frames.
+template <class Contact>
+const Contact* asPyramid(const ContactBase& contact) {
+  if (typeid(contact) != typeid(Contact) || contact.getSet()) return nullptr;
+  const auto& known = static_cast<const Contact&>(contact);
+  return internal::isPlain(known.getSettings()) ? &known : nullptr;
 }
-const ContactPoint* asPoint(const ContactBase& contact) {
-  return typeid(contact) == typeid(ContactPoint) ? static_cast<const ContactPoint*>(&contact)
-                                                 : nullptr;
-}
+const Contact6D* asSurface(const ContactBase& contact) { return asPyramid<Contact6D>(contact); }
+const ContactPoint* asPoint(const ContactBase& contact) { return asPyramid<ContactPoint>(contact); }
 
 bool isAligned(const ContactBase& contact) {
   const ContactPoint* point = asPoint(contact);

@@ -8,6 +8,7 @@
 
 #include "check.hpp"
 #include "dual_newton.hpp"
+#include "dynacom/distribution_solver.hpp"
 #include "two_stage.hpp"
 
 namespace dynacom {
@@ -64,11 +65,52 @@ void requireInitialised(const ContactBase& contact) {
   if (contact.cols() == 0) throwInvalid("a contact was never initialised");
 }
 
+// Whether some contacts are more than pyramids.
+bool hasSets(const std::vector<Contact>& contacts) {
+  return std::any_of(contacts.begin(), contacts.end(),
+                     [](const Contact& contact) { return contact.set.has_value(); });
+}
+
+// The set of a contact that has none but its inequalities.
+ContactSet describePyramid(const Eigen::MatrixXd& A) {
+  const std::optional<internal::BoxCone> cone = internal::BoxCone::recognise(A);
+  if (!cone)
+    throwInvalid(
+        "contacts that are given by matrices alone, which are no pyramids, cannot share a "
+        "wrench with ones that have a set");
+  const auto limit = [&](std::size_t component) { return cone->sides[component].beta; };
+  const Eigen::Vector2d friction(limit(0), limit(1));
+  const Section section = Section::rectangle(-friction, friction);
+  if (cone->size == 3) return ContactSet::point(section);
+  const Eigen::Vector2d half(limit(4), limit(3));  // moments are (y, −x) f_z
+  return ContactSet::surface(section, Section::rectangle(-half, half), limit(5));
+}
+
+// Contacts as a problem for the solver of all sets; NE is [R 0; [p]×R R].
+void describe(const std::vector<Contact>& contacts, DistributionProblem& problem) {
+  problem.contacts.resize(contacts.size());
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const Contact& contact = contacts[k];
+    DistributionProblem::Contact& described = problem.contacts[k];
+    described.set = contact.set ? *contact.set : describePyramid(contact.A);
+    described.weights = contact.weights;
+    described.reference = contact.reference;
+    described.rotation = contact.NE.topLeftCorner<3, 3>();
+    described.lever.setZero();
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3d direction = contact.NE.col(axis).head<3>();
+      described.lever += 0.5 * direction.cross(Eigen::Vector3d(contact.NE.col(axis).tail<3>()));
+    }
+  }
+}
+
 // Gives a contact's share of a result its sizes.
 void resize(Contact& contact, Eigen::Index rows, Eigen::Index cols) {
   contact.A.resize(rows, cols);
   contact.weights.resize(cols);
   contact.NE.resize(6, cols);
+  contact.set.reset();
+  contact.reference.setZero(cols);
   contact.force.setZero(cols);
   contact.active.setConstant(rows, false);
   contact.multipliers.setZero(rows);
@@ -110,6 +152,20 @@ Eigen::VectorXd DistributionResult::forces() const {
 }
 
 bool DistributionResult::isOptimal(double tolerance) const {
+  if (hasSets(contacts)) {
+    DistributionProblem problem;
+    describe(contacts, problem);
+    problem.wrench = wrench;
+    problem.wrench_weights = wrench_weights;
+    problem.minimal_scale = scale / wrench_weights.head<3>().maxCoeff();
+    DistributionSolution solution;
+    solution.status = status;
+    for (const Contact& contact : contacts) solution.forces.push_back(contact.force);
+    solution.achieved = achieved;
+    solution.residual = residual;
+    solution.multipliers = wrench_multipliers;
+    return solution.isOptimal(problem, tolerance);
+  }
   const double overall_weight =
       overallWeight(wrench_weights, normOf(wrench), normOf(weighted(wrench_weights, wrench)));
   const double unit = scale / overall_weight;  // of forces
@@ -197,7 +253,8 @@ struct WrenchDistribution::Workspace {
   struct Slot {
     // As last added: inequalities in two parts, those of a contact.
     Eigen::MatrixXd unilaterality, friction;
-    Eigen::VectorXd weights;
+    Eigen::VectorXd weights, reference;
+    std::optional<ContactSet> set;
     std::uint64_t revision = 0;  // of the contact, if it was one
     NewtonEuler NE;
     bool changed = true;             // whether the last solve() knew other inequalities and weights
@@ -226,7 +283,10 @@ struct WrenchDistribution::Workspace {
   double unit = 0., overall_weight = 1.;
   Vector6 wrench_weights = Vector6::Ones();
 
-  DualNewton newton;                            // for nearly all problems
+  bool has_sets = false;                        // whether some contacts of the result have one
+  DistributionSolver sets;                      // for these
+  DistributionProblem problem;                  // and what it is asked
+  DualNewton newton;                            // for nearly all others
   TwoStageSolver<double> solver;                // what that leaves
   TwoStageSolver<long double> accurate_solver;  // several times slower
 
@@ -234,11 +294,13 @@ struct WrenchDistribution::Workspace {
   Slot& takeSlot(std::size_t slot);
   void describe(Slot& slot, const ContactBase& contact);
   void describe(Slot& slot, const MatrixRef& unilaterality, const MatrixRef& friction,
-                const VectorRef& weights);
+                const VectorRef& weights, const VectorRef& reference,
+                const std::optional<ContactSet>& set);
   void reserve();
   void takeProblem();
   void rearrange();
   bool distribute();
+  bool distributeBySets(double minimal_scale);
   bool distributeRobustly();
   template <class Scalar>
   bool distributeBy(TwoStageSolver<Scalar>& solver);
@@ -249,6 +311,7 @@ struct WrenchDistribution::Workspace {
   void sumUp();
   bool findDistance(const Vector6& target, Vector6& distance);
   double findBoundary(const Vector6& wrench, const Vector6& direction, double bound);
+  double findBoundaryOfSets(const Vector6& direction, double bound);
 };
 
 WrenchDistribution::WrenchDistribution() : work_(std::make_unique<Workspace>()) {}
@@ -315,6 +378,7 @@ void WrenchDistribution::reset() {
 void WrenchDistribution::forgetAnswers() {
   Workspace& work = use();
   work.newton.forget();
+  work.sets.forget();
   work.has_answer = false;
 }
 
@@ -341,21 +405,26 @@ WrenchDistribution::Workspace::Slot& WrenchDistribution::Workspace::takeSlot(std
 // What is the same as before is not written: this happens at every tick.
 void WrenchDistribution::Workspace::describe(Slot& slot, const ContactBase& contact) {
   if (slot.revision == contact.getRevision()) return;
-  describe(slot, contact.uni_A(), contact.fri_A(), contact.reg_A());
+  describe(slot, contact.uni_A(), contact.fri_A(), contact.reg_A(), contact.reg_b(),
+           contact.getSet());
   slot.revision = contact.getRevision();
 }
 
 void WrenchDistribution::Workspace::describe(Slot& slot, const MatrixRef& unilaterality,
-                                             const MatrixRef& friction, const VectorRef& weights) {
+                                             const MatrixRef& friction, const VectorRef& weights,
+                                             const VectorRef& reference,
+                                             const std::optional<ContactSet>& set) {
   slot.revision = 0;
   if (areSame(slot.unilaterality, unilaterality) && areSame(slot.friction, friction) &&
-      areSame(slot.weights, weights))
+      areSame(slot.weights, weights) && areSame(slot.reference, reference) && slot.set == set)
     return;
   const Eigen::Index rows = unilaterality.rows() + friction.rows(), cols = weights.size();
   const bool same_sizes = slot.rows() == rows && slot.weights.size() == cols;
   slot.unilaterality = unilaterality;
   slot.friction = friction;
   slot.weights = weights;
+  slot.reference = reference;
+  slot.set = set;
   slot.changed = true;
   if (same_sizes) return;
   slot.NE.resize(6, cols);
@@ -415,7 +484,8 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
   Workspace& work = use();
   Workspace::Slot& taken = work.takeSlot(work.added.size());
   const Eigen::MatrixXd no_friction(0, A.cols());
-  work.describe(taken, A, no_friction, weights);
+  work.describe(taken, A, no_friction, weights, Eigen::VectorXd::Zero(weights.size()),
+                std::nullopt);
   taken.NE = NE;
   taken.moved = true;
 }
@@ -434,6 +504,8 @@ void WrenchDistribution::Workspace::takeProblem() {
       contact.A.topRows(slot.unilaterality.rows()) = slot.unilaterality;
       contact.A.bottomRows(slot.friction.rows()) = slot.friction;
       contact.weights = slot.weights;
+      contact.reference = slot.reference;
+      contact.set = slot.set;
       newton.setContact(solved[k], contact);
       slot.changed = same = false;
     }
@@ -441,6 +513,7 @@ void WrenchDistribution::Workspace::takeProblem() {
     slot.moved = false;
   }
   if (same) return;
+  has_sets = hasSets(result.contacts);
   has_answer = false;
   newton.setActive(solved, result.contacts);
 }
@@ -474,6 +547,34 @@ bool WrenchDistribution::Workspace::distribute() {
   }
   result.iterations = std::min(result.iterations + newton.iterationsInVain(), maximal_iterations);
   return answered;
+}
+
+// Contacts some of which are more than pyramids.
+bool WrenchDistribution::Workspace::distributeBySets(double minimal_scale) {
+  dynacom::describe(result.contacts, problem);
+  problem.wrench = result.wrench;
+  problem.wrench_weights = settings;
+  problem.minimal_scale = minimal_scale;
+  sets.setMaximalIterations(maximal_iterations);
+  sets.setWarmStart(warm_start);
+  const DistributionSolution& solution = sets.solve(problem);
+  result.scale = problem.scale();
+  result.status = solution.status;
+  result.iterations = solution.iterations;
+  if (result.status != DistributionStatus::Solved && result.status != DistributionStatus::Relaxed)
+    return false;
+  result.achieved = solution.achieved;
+  result.residual = solution.residual;
+  result.cost = solution.cost;
+  result.wrench_multipliers = solution.multipliers;
+  for (std::size_t k = 0; k < result.contacts.size(); ++k) {
+    Contact& contact = result.contacts[k];
+    contact.force = solution.forces[k];
+    contact.active.setConstant(false);
+    contact.multipliers.setZero();
+    contact.relaxation_multipliers.setZero();
+  }
+  return true;
 }
 
 // Few problems need more digits than double has: those where contacts are nearly parallel, and
@@ -541,7 +642,8 @@ void WrenchDistribution::Workspace::sumUp() {
   result.cost = 0.;
   for (const Contact& contact : result.contacts) {
     result.achieved.noalias() += contact.NE * contact.force;
-    result.cost += 0.5 * contact.weights.cwiseProduct(contact.force).squaredNorm();
+    result.cost +=
+        0.5 * contact.weights.cwiseProduct(contact.force - contact.reference).squaredNorm();
   }
   result.residual = result.wrench - result.achieved;
 }
@@ -573,6 +675,8 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   } else if (work.solved.empty()) {
     const bool zero = weighted_size <= kReach * result.scale;
     result.status = zero ? DistributionStatus::Solved : DistributionStatus::NoContact;
+  } else if (work.has_sets) {
+    answered = work.distributeBySets(minimalScale);
   } else if (work.unit == 0.) {
     work.has_answer = false;  // all forces are zero
     result.status = DistributionStatus::Solved;
@@ -626,6 +730,29 @@ double WrenchDistribution::Workspace::findBoundary(const Vector6& wrench, const 
   return s;
 }
 
+// The largest s, but for what is above a bound, for which the wrench plus s times a direction is
+// reachable, see findBoundary(); what is reachable need not be a cone. From a point far beyond, or
+// infinite where all that was looked at is reachable. Negative if it fails.
+double WrenchDistribution::Workspace::findBoundaryOfSets(const Vector6& direction, double bound) {
+  constexpr double kFarthest = 1e6;  // of the scale
+  double s = std::isfinite(bound) ? bound : kFarthest * result.scale;
+  const Vector6 start = result.achieved;
+  for (int step = 0; step < kMarginSteps && s > 0.; ++step) {
+    problem.wrench = start + s * direction;
+    const DistributionSolution& solution = sets.solve(problem);
+    if (solution.status == DistributionStatus::Solved)
+      return step == 0 && !std::isfinite(bound) ? bound : s;
+    if (solution.status != DistributionStatus::Relaxed) return -1.;
+    // The plane between the point and what is reachable.
+    const Vector6 outward = weighted(settings.cwiseAbs2(), solution.residual);
+    const double cut =
+        std::max(0., outward.dot(solution.achieved - start) / outward.dot(direction));
+    if (!(cut < s * (1. - kMarginChange))) break;
+    s = cut > kMarginChange * result.scale ? cut : 0.;
+  }
+  return s;
+}
+
 WrenchMargin WrenchDistribution::computeMargin() {
   Workspace& work = use();
   const DistributionResult& result = work.result;
@@ -638,20 +765,35 @@ WrenchMargin WrenchDistribution::computeMargin() {
       result.status == DistributionStatus::NoContact)
     return margin;
 
+  double least = std::numeric_limits<double>::infinity();
+  const auto take = [&](double s, int axis, int sign) {
+    if (!(s < least)) return;
+    least = s;
+    margin.axis = axis;
+    margin.sign = sign;
+  };
+  if (work.has_sets) {
+    for (int axis = 0; axis < 6; ++axis)
+      for (const int sign : {1, -1}) {
+        const double s =
+            work.findBoundaryOfSets(sign / work.settings[axis] * Vector6::Unit(axis), least);
+        if (s < 0.) return WrenchMargin();
+        take(s, axis, sign);
+      }
+    work.sets.forget();
+    margin.margin = least;
+    return margin;
+  }
+
   Vector6 wrench = weighted(work.wrench_weights, result.achieved);
   if (work.unit > 0.) wrench /= work.unit;
   work.solver.setProblem(result.contacts, work.wrench_weights);
   work.accurate_solver.setProblem(result.contacts, work.wrench_weights);
-  double least = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 6; ++axis) {
     for (const int sign : {1, -1}) {
       const double s = work.findBoundary(wrench, sign * Vector6::Unit(axis), least);
       if (s < 0.) return WrenchMargin();
-      if (s < least) {
-        least = s;
-        margin.axis = axis;
-        margin.sign = sign;
-      }
+      take(s, axis, sign);
     }
   }
   margin.margin = work.unit > 0. ? result.scale * least : least;

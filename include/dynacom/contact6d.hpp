@@ -4,11 +4,12 @@
 #include <iosfwd>
 
 #include "dynacom/contact_base.hpp"
+#include "dynacom/surface_options.hpp"
 
 namespace dynacom {
 
 /// What describes a Contact6D. The defaults describe a frictionless point.
-struct DYNACOM_EXPORT Contact6DSettings {
+struct DYNACOM_EXPORT Contact6DSettings : SurfaceOptions {
   /// Friction coefficient μ ≥ 0.
   double mu = 0.;
   /// Yaw friction coefficient γ ≥ 0: |τ_z| ≤ γ f_z [m].
@@ -21,6 +22,9 @@ struct DYNACOM_EXPORT Contact6DSettings {
   Eigen::Matrix<double, 6, 1> weights = Eigen::Matrix<double, 6, 1>::Ones();
   /// Name of the frame in the robot's model, at the rectangle's centre; not empty.
   std::string frame_name;
+
+  /// Force that the cost pulls to, λ₀ of ½ Σ (wᵢ (λ − λ₀)ᵢ)² [N], [N·m].
+  Eigen::Matrix<double, 6, 1> reference = Eigen::Matrix<double, 6, 1>::Zero();
 
   /// @throws std::invalid_argument naming the first field out of its range
   void validate() const;
@@ -59,6 +63,8 @@ class DYNACOM_EXPORT Contact6D : public ContactBase {
   std::shared_ptr<ContactBase> clone() const override;
   const Contact6DSettings& getSettings() const { return settings_; }
   const std::string& getFrameName() const override { return settings_.frame_name; }
+  /// getPose() and SurfaceOptions::placement.
+  SE3 getSurfacePose() const override;
   Eigen::Matrix2Xd getCorners() const override;
   double getFrictionUsage() const override;
   double getCoPMargin() const override;

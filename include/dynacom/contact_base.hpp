@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <pinocchio/spatial.hpp>
 #include <string>
 
+#include "dynacom/contact_set.hpp"
 #include "dynacom/errors.hpp"
 #include "dynacom/export.hpp"
 
@@ -71,18 +73,23 @@ class DYNACOM_EXPORT ContactBase {
   Eigen::Index fri_rows() const { return fri_A_.rows(); }
   Eigen::Index cols() const { return reg_A_.size(); }
 
-  /// Unilaterality, uni_rows() × cols(), and its right-hand side, uni_rows(), which is zero.
+  /// Unilaterality, uni_rows() × cols(), and its right-hand side, uni_rows(), which is zero unless
+  /// the normal force has bounds.
   const Eigen::MatrixXd& uni_A() const { return uni_A_; }
   const Eigen::VectorXd& uni_b() const { return uni_b_; }
 
-  /// Friction, fri_rows() × cols(), and its right-hand side, fri_rows(), which is zero.
+  /// Friction, fri_rows() × cols(), and its right-hand side, fri_rows(), which is zero. Of a
+  /// friction cone it has the pyramid around it.
   const Eigen::MatrixXd& fri_A() const { return fri_A_; }
   const Eigen::VectorXd& fri_b() const { return fri_b_; }
 
   /// Weights wᵢ of the components of λ in the cost ½ Σ (wᵢ λᵢ)², and the value that the cost pulls
-  /// λ to, which is zero; cols() each.
+  /// λ to, which is zero unless there is a reference; cols() each.
   const Eigen::VectorXd& reg_A() const { return reg_A_; }
   const Eigen::VectorXd& reg_b() const { return reg_b_; }
+
+  /// The set of λ, where it is another than uni_A() λ ≤ 0, fri_A() λ ≤ 0.
+  const std::optional<ContactSet>& getSet() const { return set_; }
 
   /// Number of these matrices, but for ne_A(): another one whenever they may have changed, and no
   /// other contact's unless they are copies of each other; 0 before there are any.
@@ -120,9 +127,9 @@ class DYNACOM_EXPORT ContactBase {
   Eigen::Vector2d getCoP() const;
 
   /// How much of the friction that the applied force allows it uses: the larger of |f_x| and |f_y|
-  /// over μ f_z, 1 on the pyramid. NaN where there is no friction to use (μ = 0), and for kinds
-  /// that know of none; else 0 where there is no force, and infinite where there is one without a
-  /// positive normal force.
+  /// over μ f_z, 1 on the pyramid; of other friction SurfaceOptions::findTangential() over that.
+  /// NaN where there is no friction to use (μ = 0), and for kinds that know of none; else 0 where
+  /// there is no force, and infinite where there is one without a positive normal force.
   virtual double getFrictionUsage() const;
   /// Distance of getCoP() to the nearest edge of the surface, negative beyond it [m]; NaN unless
   /// the normal force is positive, and for kinds without edges.
@@ -147,6 +154,16 @@ class DYNACOM_EXPORT ContactBase {
                    const Eigen::Ref<const Eigen::MatrixXd>& fri_A,
                    const Eigen::Ref<const Eigen::VectorXd>& reg_A);
 
+  /// The same for a contact of another set, or with a force that the cost pulls to.
+  /// @param uni_b, fri_b, reg_b  right-hand sides
+  /// @param set  set.size() components
+  void setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
+                   const Eigen::Ref<const Eigen::VectorXd>& uni_b,
+                   const Eigen::Ref<const Eigen::MatrixXd>& fri_A,
+                   const Eigen::Ref<const Eigen::VectorXd>& fri_b,
+                   const Eigen::Ref<const Eigen::VectorXd>& reg_A,
+                   const Eigen::Ref<const Eigen::VectorXd>& reg_b, const ContactSet& set);
+
   /// Forgets frame index, force and ne_A(). For initialize(), after setMatrices().
   void reset();
 
@@ -165,7 +182,8 @@ class DYNACOM_EXPORT ContactBase {
   Eigen::MatrixXd uni_A_, fri_A_;
   Eigen::VectorXd reg_A_;
   std::uint64_t revision_ = 0;
-  Eigen::VectorXd uni_b_, fri_b_, reg_b_;  // zeros: only cones can be projected on
+  Eigen::VectorXd uni_b_, fri_b_, reg_b_;
+  std::optional<ContactSet> set_;
   Eigen::Matrix<double, 6, Eigen::Dynamic> ne_A_;
   FrameIndex frame_id_ = kUnknownFrame;
   SE3 pose_ = SE3::Identity();

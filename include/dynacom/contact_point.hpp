@@ -4,11 +4,12 @@
 #include <iosfwd>
 
 #include "dynacom/contact_base.hpp"
+#include "dynacom/surface_options.hpp"
 
 namespace dynacom {
 
 /// What describes a ContactPoint. The defaults describe a frictionless point.
-struct DYNACOM_EXPORT ContactPointSettings {
+struct DYNACOM_EXPORT ContactPointSettings : SurfaceOptions {
   /// Friction coefficient μ ≥ 0.
   double mu = 0.;
   /// Weights (f_x, f_y, f_z) > 0 of the cost, which squares them [1/N].
@@ -20,6 +21,9 @@ struct DYNACOM_EXPORT ContactPointSettings {
   bool world_aligned = false;
   /// The point lies this far below the frame's origin, along the surface's normal, ≥ 0 [m].
   double radius = 0.;
+
+  /// Force that the cost pulls to, λ₀ of ½ Σ (wᵢ (λ − λ₀)ᵢ)² [N].
+  Eigen::Vector3d reference = Eigen::Vector3d::Zero();
 
   /// @throws std::invalid_argument naming the first field out of its range
   void validate() const;

@@ -5,35 +5,13 @@
 #include <iosfwd>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dynacom/contact_base.hpp"
+#include "dynacom/distribution_status.hpp"
 
 namespace dynacom {
-
-/// How a distribution ended. Whatever it says, the forces lie within all inequalities, but for
-/// rounding of 1e-9 of the scale.
-enum class DistributionStatus {
-  /// The wrench can be reached: its distance to what the contacts can give is at most 1e-8 of the
-  /// scale. The forces give it, and are the cheapest that do.
-  Solved,
-  /// The wrench is out of reach. The forces give the closest one that the contacts can give, and
-  /// are the cheapest that do.
-  Relaxed,
-  /// There is no contact, and the wrench is not zero (1e-8 of the scale is). Also before the first
-  /// solve().
-  NoContact,
-  /// A number that came in was not finite. The forces are those of the last Solved or Relaxed, if
-  /// contacts and settings are still the same, else zero.
-  InvalidInput,
-  /// The iterations were used up, see WrenchDistribution::setMaximalIterations(), or the answer did
-  /// not pass the check. The forces are as for InvalidInput.
-  NumericalFailure,
-};
-
-/// The value's name, as written above.
-DYNACOM_EXPORT const char* to_string(DistributionStatus status);
-DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, DistributionStatus status);
 
 /// What a distribution was asked, and what it answered.
 ///
@@ -52,6 +30,10 @@ struct DYNACOM_EXPORT DistributionResult {
     /// Which inequalities the answer was found with as equations, m. Others may be equations, too,
     /// where more meet than are needed.
     Eigen::Array<bool, Eigen::Dynamic, 1> active;
+    /// The contact's set, where A λ ≤ 0 alone does not describe it; then inequalities have no
+    /// multipliers, and none is active: isOptimal() asks the set.
+    std::optional<ContactSet> set;
+    Eigen::VectorXd reference;  ///< λ₀ of the cost ½ Σ (wᵢ (λ − λ₀)ᵢ)², n
     /// Multipliers μ of the inequalities in the minimum of the cost, m: zero where one is not
     /// active; ≥ 0, but for those that the relaxation multiplies, which are equations there.
     Eigen::VectorXd multipliers;
