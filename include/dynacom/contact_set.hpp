@@ -72,7 +72,7 @@ class DYNACOM_EXPORT Section {
 ///
 /// F is the friction: Coulomb's cone of radius μ is a disc, pyramids are polygons. P are the
 /// moments of a force at the places of the surface, (y, −x). Of grasps, each component is between
-/// bounds of its own.
+/// bounds of its own. Equations (21) to (23) in docs/equations.md.
 class DYNACOM_EXPORT ContactSet {
  public:
   enum class Kind { Point, Surface, Grasp };
