@@ -24,7 +24,9 @@ void exposeGroundPlane();
 void exposeContactBase();
 void exposeContactPoint();
 void exposeContact6D();
+void exposeContactSet();
 void exposeWrenchDistribution();
+void exposeDistributionSolver();
 void exposeDynaCoM();
 void exposeNumberTable();
 void exposeMotion();
@@ -75,6 +77,22 @@ Eigen::Matrix<double, size, 1> toVector(const char* name, const bp::object& valu
   const Eigen::VectorXd numbers = toNumbers(name, values, size);
   internal::requireSize(name, numbers.size(), Eigen::Index(size), "components");
   return numbers;
+}
+
+/// Refuses what is no array, list or tuple.
+/// @param elements  what it should have, in the plural
+void requireSequence(const char* name, const bp::object& values, const char* elements);
+
+/// Rows of a fixed size, of a two-dimensional array or a list, as columns.
+template <int size>
+Eigen::Matrix<double, size, Eigen::Dynamic> toColumns(const char* name, const bp::object& rows) {
+  requireSequence(name, rows, "rows");
+  Eigen::Matrix<double, size, Eigen::Dynamic> columns(size, bp::len(rows));
+  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+    const std::string row = internal::concat(name, "[", k, "]");
+    columns.col(k) = toVector<size>(row.c_str(), bp::object(rows[k]));
+  }
+  return columns;
 }
 
 /// A property that hands out a copy of a member.
@@ -225,9 +243,16 @@ struct CopyVisitor : bp::def_visitor<CopyVisitor<Class>> {
   static Class deepcopy(const Class& self, const bp::dict&) { return self; }
 };
 
+/// For __reduce__ of enums: a value is copied, and sent to another process, by its name.
+/// Boost.Python's enums are integers and would come back as such, without it.
+bp::tuple reduceEnum(const bp::object& self);
+
 /// Sets an attribute that there is, to numpy's numbers as to Python's. Python would make a new one
 /// of a misspelt name, and say nothing.
 void setKnownAttribute(const bp::object& self, const bp::str& name, const bp::object& value);
+
+/// The name of an object's class.
+std::string typeName(const bp::object& object);
 
 /// "[1 2 3]", as in the printing of settings.
 std::string toText(const Eigen::VectorXd& values);

@@ -11,9 +11,7 @@ std::shared_ptr<BodyPoints> makeBody(const std::string& link, Index joint, const
   const auto body = std::make_shared<BodyPoints>();
   body->link = link;
   body->joint = joint;
-  body->points.resize(3, bp::len(points));
-  for (Eigen::Index k = 0; k < body->points.cols(); ++k)
-    body->points.col(k) = toVector<3>("points", bp::object(points[k]));
+  body->points = toColumns<3>("points", points);
   body->radius = toNumbers("radius", radius, static_cast<int>(body->points.cols()));
   internal::requireSize("radius", body->radius.size(), body->points.cols(), "points");
   return body;

@@ -34,14 +34,6 @@ bp::list getContacts(const DistributionResult& self) {
   return contacts;
 }
 
-// A status is copied, and sent to another process, by its name: Boost.Python's enums are integers
-// and would come back as such, without it.
-bp::tuple reduceStatus(const bp::object& self) {
-  const bp::object cls = self.attr("__class__"), name = self.attr("name");
-  return bp::make_tuple(bp::object(bp::import("builtins").attr("getattr")),
-                        bp::make_tuple(cls, name));
-}
-
 std::string writeResult(const DistributionResult& result) {
   std::string forces;
   for (const Contact& contact : result.contacts)
@@ -100,7 +92,7 @@ void exposeWrenchDistribution() {
       .value("NoContact", DistributionStatus::NoContact)
       .value("InvalidInput", DistributionStatus::InvalidInput)
       .value("NumericalFailure", DistributionStatus::NumericalFailure);
-  status.attr("__reduce__") = bp::make_function(&reduceStatus);
+  status.attr("__reduce__") = bp::make_function(&reduceEnum);
 
   {
     const bp::scope result =

@@ -34,7 +34,9 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   exposeContactBase();
   exposeContactPoint();
   exposeContact6D();
+  exposeContactSet();
   exposeWrenchDistribution();
+  exposeDistributionSolver();
   exposeDynaCoM();
   exposeNumberTable();
   exposeMotion();

@@ -5,8 +5,6 @@ namespace dynacom::python {
 
 namespace {
 
-std::string typeName(const bp::object& object) { return Py_TYPE(object.ptr())->tp_name; }
-
 [[noreturn]] void refuse(const char* name, int size, const std::string& got) {
   const std::string message = internal::concat(name, " must be an array, a list or a tuple of ",
                                                size, " numbers, got ", got);
@@ -22,6 +20,19 @@ std::string describeRefused(const bp::object& values) {
 }
 
 }  // namespace
+
+std::string typeName(const bp::object& object) { return Py_TYPE(object.ptr())->tp_name; }
+
+void requireSequence(const char* name, const bp::object& values, const char* elements) {
+  const bool is_array =
+      PyArray_Check(values.ptr()) &&
+      PyArray_NDIM(reinterpret_cast<PyArrayObject*>(values.ptr())) > 0;  // else it has no length
+  if (is_array || PyList_Check(values.ptr()) || PyTuple_Check(values.ptr())) return;
+  const std::string message = internal::concat(name, " must be an array, a list or a tuple of ",
+                                               elements, ", got ", typeName(values));
+  PyErr_SetString(PyExc_TypeError, message.c_str());
+  throw bp::error_already_set();
+}
 
 const double* findNumbers(const bp::object& values, int size) {
   if (!PyArray_Check(values.ptr())) return nullptr;
@@ -58,6 +69,12 @@ std::string toText(const std::vector<std::string>& names) {
   std::string text = "[";
   for (const std::string& name : names) text += (text.size() > 1 ? ", '" : "'") + name + "'";
   return text + "]";
+}
+
+bp::tuple reduceEnum(const bp::object& self) {
+  const bp::object cls = self.attr("__class__"), name = self.attr("name");
+  return bp::make_tuple(bp::object(bp::import("builtins").attr("getattr")),
+                        bp::make_tuple(cls, name));
 }
 
 void setKnownAttribute(const bp::object& self, const bp::str& name, const bp::object& value) {

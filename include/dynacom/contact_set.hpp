@@ -2,7 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <iosfwd>
 #include <limits>
+#include <string>
 
 #include "dynacom/export.hpp"
 
@@ -47,6 +49,9 @@ class DYNACOM_EXPORT Section {
   /// larger: the largest of its inequalities, each with a normal of length 1; ≤ 0 inside.
   double excess(const Eigen::Vector2d& point, double normal_force) const;
 
+  /// The shape, and what it needs; of a polygon the number of vertices and the box around them.
+  std::string to_string() const;
+
   bool operator==(const Section& other) const;
   bool operator!=(const Section& other) const { return !(*this == other); }
 
@@ -63,11 +68,11 @@ class DYNACOM_EXPORT Section {
 /// Of points and surfaces, with the normal force f_z between its bounds, and sections that grow
 /// with it,
 ///
-///     lo ≤ f_z ≤ hi,   (f_x, f_y) ∈ f_z D,   (τ_x, τ_y) ∈ f_z P,   |τ_z| ≤ γ f_z,
+///     lo ≤ f_z ≤ hi,   (f_x, f_y) ∈ f_z F,   (τ_x, τ_y) ∈ f_z P,   |τ_z| ≤ γ f_z,
 ///
-/// D is the friction: Coulomb's cone of radius μ is a disc, pyramids are polygons. P are the
+/// F is the friction: Coulomb's cone of radius μ is a disc, pyramids are polygons. P are the
 /// moments of a force at the places of the surface, (y, −x). Of grasps, each component is between
-/// bounds of its own.
+/// bounds of its own. Equations (24) to (26) in docs/equations.md.
 class DYNACOM_EXPORT ContactSet {
  public:
   enum class Kind { Point, Surface, Grasp };
@@ -76,9 +81,9 @@ class DYNACOM_EXPORT ContactSet {
 
   /// A frictionless point.
   ContactSet() = default;
-  /// @param friction  D
+  /// @param friction  F
   static ContactSet point(const Section& friction);
-  /// @param friction  D
+  /// @param friction  F
   /// @param places    where pressure may be [m]; P is that, turned by −90°
   /// @param gamma     γ [m]
   /// @throws std::invalid_argument unless γ is finite and ≥ 0
@@ -94,8 +99,8 @@ class DYNACOM_EXPORT ContactSet {
   Kind kind() const { return kind_; }
   /// Number of components of λ: 3 or 6.
   Eigen::Index size() const { return kind_ == Kind::Point ? 3 : 6; }
-  const Section& friction() const { return friction_; }
-  const Section& moments() const { return moments_; }  ///< P
+  const Section& friction() const { return friction_; }  ///< F
+  const Section& moments() const { return moments_; }    ///< P
   double gamma() const { return gamma_; }
   /// Of each component; of points and surfaces, of the third only.
   const Vector6& lower() const { return lower_; }
@@ -113,6 +118,9 @@ class DYNACOM_EXPORT ContactSet {
   /// @param force  size()
   double excess(const Eigen::Ref<const Eigen::VectorXd>& force) const;
 
+  /// The kind, and what it needs.
+  std::string to_string() const;
+
   bool operator==(const ContactSet& other) const;
   bool operator!=(const ContactSet& other) const { return !(*this == other); }
 
@@ -122,5 +130,9 @@ class DYNACOM_EXPORT ContactSet {
   double gamma_ = 0.;
   Vector6 lower_ = Vector6::Zero(), upper_ = Vector6::Constant(kInfinity);
 };
+
+/// Each written as by its to_string().
+DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const Section& section);
+DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const ContactSet& set);
 
 }  // namespace dynacom

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ostream>
 #include <vector>
 
 #include "../check.hpp"
@@ -38,6 +39,15 @@ std::vector<Vector2d> findHull(std::vector<Vector2d> points) {
   addChain(points.begin(), points.end());
   addChain(points.rbegin(), points.rend());
   return hull;
+}
+
+// Writes "lower=[1 2], upper=[3 4]".
+template <class Vector>
+std::ostream& writeBox(std::ostream& out, const Vector& lower, const Vector& upper) {
+  const Eigen::IOFormat row(Eigen::StreamPrecision, Eigen::DontAlignCols, " ", " ", "", "", "[",
+                            "]");
+  return out << "lower=" << lower.transpose().format(row)
+             << ", upper=" << upper.transpose().format(row);
 }
 
 }  // namespace
@@ -123,6 +133,8 @@ double Section::excess(const Vector2d& point, double normal_force) const {
   }
   return most;
 }
+
+std::string Section::to_string() const { return internal::concat(*this); }
 
 bool Section::operator==(const Section& other) const {
   return shape_ == other.shape_ && lower_ == other.lower_ && upper_ == other.upper_ &&
@@ -218,9 +230,34 @@ double ContactSet::excess(const Eigen::Ref<const Eigen::VectorXd>& force) const 
   return most;
 }
 
+std::string ContactSet::to_string() const { return internal::concat(*this); }
+
 bool ContactSet::operator==(const ContactSet& other) const {
   return kind_ == other.kind_ && friction_ == other.friction_ && moments_ == other.moments_ &&
          gamma_ == other.gamma_ && lower_ == other.lower_ && upper_ == other.upper_;
+}
+
+std::ostream& operator<<(std::ostream& out, const Section& section) {
+  switch (section.shape()) {
+    case Section::Shape::Disc:
+      return out << "Section(shape=Disc, radius=" << section.radius() << ")";
+    case Section::Shape::Polygon:
+      out << "Section(shape=Polygon, vertices=" << section.vertices().cols();
+      break;
+    case Section::Shape::Rectangle:
+      out << "Section(shape=Rectangle";
+      break;
+  }
+  return writeBox(out << ", ", section.lower(), section.upper()) << ")";
+}
+
+std::ostream& operator<<(std::ostream& out, const ContactSet& set) {
+  if (set.kind() == ContactSet::Kind::Grasp)
+    return writeBox(out << "ContactSet(kind=Grasp, ", set.lower(), set.upper()) << ")";
+  const bool is_point = set.kind() == ContactSet::Kind::Point;
+  out << "ContactSet(kind=" << (is_point ? "Point" : "Surface") << ", friction=" << set.friction();
+  if (!is_point) out << ", moments=" << set.moments() << ", gamma=" << set.gamma();
+  return out << ", normal_force=[" << set.lower()[2] << " " << set.upper()[2] << "])";
 }
 
 }  // namespace dynacom

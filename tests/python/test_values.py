@@ -56,6 +56,8 @@ def objects(talos, talos_standing, talos_motion):
     repairer = dynacom.make_repairer(talos, dynacom.AnalysisOptions())
     hurried = replace(report.clip, time=report.clip.time / 1.5, v=None, a=None)
     mended = dynacom.repair(hurried, talos, strict=True)
+    hand = dynacom.DistributionContact(dynacom.ContactSet(), weights=[1.0, 2.0, 3.0])
+    problem = dynacom.DistributionProblem([hand], [0.0, 0.0, 10.0, 0.0, 0.0, 0.0])
     objects = [
         state,
         dynacom.computeGroundWrench(state, [0.0, 0.0, -9.81]),
@@ -123,6 +125,12 @@ def objects(talos, talos_standing, talos_motion):
         hovering.terrain,
         hovering.terrain.contacts[0],
         hovering.terrain.held[0],
+        dynacom.Section.disc(0.5),
+        dynacom.ContactSet(),
+        hand,
+        problem,
+        dynacom.DistributionSolver(),
+        dynacom.DistributionSolver().solve(problem),
     ]
     return {type(value).__qualname__: value for value in objects} | {
         "DistributionResult.Contact": result.contacts[0],
