@@ -25,6 +25,8 @@ void exposeContactBase();
 void exposeContactPoint();
 void exposeContact6D();
 void exposeContactSet();
+void exposeFrictionModel();
+void exposeContactKinds();
 void exposeWrenchDistribution();
 void exposeDistributionSolver();
 void exposeDynaCoM();

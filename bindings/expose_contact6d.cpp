@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "bindings.hpp"
 #include "dynacom/contact6d.hpp"
+#include "surface_options.hpp"
 
 namespace dynacom::python {
 
@@ -28,6 +29,7 @@ void exposeContact6D() {
                     "(6,), > 0.")
       .def_readwrite("frame_name", &Settings::frame_name,
                      "Name of the frame at the rectangle's centre; not empty.")
+      .def(SurfaceOptionsVisitor<Settings>())
       .def(SettingsVisitor<Settings>());
 
   bp::class_<Contact6D, bp::bases<ContactBase>, std::shared_ptr<Contact6D>>(

@@ -18,6 +18,10 @@ void applyForce(ContactBase& self, const bp::object& force) {
   self.applyForce(toNumbers("force", force, int(self.cols())));
 }
 
+bp::object getSet(const ContactBase& self) {
+  return self.getSet() ? bp::object(*self.getSet()) : bp::object();
+}
+
 }  // namespace
 
 void exposeContactBase() {
@@ -69,6 +73,10 @@ void exposeContactBase() {
       .def("reg_A", &ContactBase::reg_A, bp::arg("self"), Copied(),
            "Weights of lambda in the cost, which squares them, (cols,).")
       .def("reg_b", &ContactBase::reg_b, bp::arg("self"), Copied(), "Zero, (cols,).")
+      .def("getSet", &getSet, bp::arg("self"),
+           "The ContactSet of lambda, where it is another than uni_A lambda <= 0, fri_A lambda <= "
+           "0;\n"
+           "else None.")
       .def("ne_A", DYNACOM_MATRIX(ContactBase, ne_A), bp::arg("self"),
            "Newton-Euler matrix, (6, cols): takes lambda to (force, moment) about the centre of\n"
            "mass in the world's axes, at the last updateNewtonEuler.")

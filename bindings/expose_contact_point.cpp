@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "bindings.hpp"
 #include "dynacom/contact_point.hpp"
+#include "surface_options.hpp"
 
 namespace dynacom::python {
 
@@ -27,6 +28,7 @@ void exposeContactPoint() {
                      "True: the surface's axes are the world's. For ball feet.")
       .def_readwrite("radius", &Settings::radius,
                      "The point lies this far below the frame's origin along the normal, >= 0 [m].")
+      .def(SurfaceOptionsVisitor<Settings>())
       .def(SettingsVisitor<Settings>());
 
   bp::class_<ContactPoint, bp::bases<ContactBase>, std::shared_ptr<ContactPoint>>(

@@ -63,6 +63,9 @@ std::string writeDistribution(const WrenchDistribution& distribution) {
       ", status=", distribution.result().status, ")");
 }
 
+bp::object getSet(const Contact& self) {
+  return self.set ? bp::object(*self.set) : bp::object();
+}
 bp::object getA(const Contact& self) { return toArray(self.A); }
 bp::object getNE(const Contact& self) { return toArray(self.NE); }
 bp::object getActive(const Contact& self) {
@@ -139,6 +142,11 @@ void exposeWrenchDistribution() {
         .add_property("A", &getA,
                       "Its inequalities A lambda <= 0: unilaterality, then friction; (m, n).")
         .add_property("weights", getter(&Contact::weights), "Weights of the cost, (n,).")
+        .add_property("set", &getSet,
+                      "The ContactSet, where the inequalities alone do not describe it; then none\n"
+                      "is active, and they have no multipliers. Else None.")
+        .add_property("reference", getter(&Contact::reference),
+                      "Force that the cost pulls to, (n,).")
         .add_property("NE", &getNE, "Takes lambda to the wrench about the centre of mass, (6, n).")
         .add_property("force", getter(&Contact::force), "lambda, in the surface's frame, (n,).")
         .add_property(

@@ -31,10 +31,12 @@ BOOST_PYTHON_MODULE(dynacom_pywrap) {
   takeNumbers();
   exposeCentroidal();
   exposeGroundPlane();
+  exposeContactSet();
+  exposeFrictionModel();
   exposeContactBase();
   exposeContactPoint();
   exposeContact6D();
-  exposeContactSet();
+  exposeContactKinds();
   exposeWrenchDistribution();
   exposeDistributionSolver();
   exposeDynaCoM();

@@ -30,6 +30,19 @@ from helpers import WALKS, point, point_settings, sole, sole_settings
 ABSTRACT = {"ContactBase", "DynacomError", "NotReadyError"}
 
 
+def polygon() -> dynacom.ContactPolygonSettings:
+    settings = dynacom.ContactPolygonSettings()
+    settings.vertices = [[0.1, 0.0], [-0.1, 0.05], [-0.1, -0.05]]
+    settings.frame_name = "foot"
+    return settings
+
+
+def grasp() -> dynacom.ContactGraspSettings:
+    settings = dynacom.ContactGraspSettings()
+    settings.frame_name = "hand"
+    return settings
+
+
 @pytest.fixture(scope="module")
 def objects(talos, talos_standing, talos_motion):
     """One of each public class, by name; those of a robot on two feet, of one frame."""
@@ -66,6 +79,11 @@ def objects(talos, talos_standing, talos_motion):
         sole_settings(),
         point(),
         sole(),
+        polygon(),
+        dynacom.ContactPolygon(polygon()),
+        grasp(),
+        dynacom.ContactGrasp(grasp()),
+        dynacom.FrictionModel.Cone,
         WrenchDistribution(),
         result,
         result.status,

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""Contacts whose sets are more than pyramids, on a robot."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.testing import assert_allclose
+
+import dynacom
+from dynacom import DistributionStatus, FrictionModel
+from helpers import sole_settings
+
+
+SOLE = {"mu": 0.5, "gu": 0.05, "half_length": 0.1, "half_width": 0.06}
+
+
+def standing(talos, **fields) -> dynacom.DynaCoM:
+    """Talos on both soles, with settings that are other than by default."""
+    robot = dynacom.DynaCoM(talos.model)
+    for side in ("left", "right"):
+        settings = sole_settings(**SOLE, frame_name=f"{side}_sole_link")
+        for name, value in fields.items():
+            setattr(settings, name, value)
+        robot.addContact(dynacom.Contact6D(settings), side)
+    return robot
+
+
+def share(
+    robot: dynacom.DynaCoM, talos_standing, sideways=(0.0, 0.0)
+) -> dynacom.DistributionResult:
+    """What the ground gives a robot that stands, pushed by forces [N] through its CoM."""
+    model = robot.getModel()
+    zero = np.zeros(model.nv)
+    robot.computeDynamics(talos_standing, zero, zero)
+    force = robot.getGroundCoMForce() + np.array([*sideways, 0.0])
+    robot.distributeForce(force, robot.getGroundCoMTorque(), robot.getCoM())
+    result = robot.getDistribution()
+    assert result.isOptimal()
+    return result
+
+
+def test_a_cone_allows_less_than_its_pyramid(talos, talos_standing):
+    forces = {}
+    for model in (FrictionModel.OuterPyramid, FrictionModel.Cone):
+        robot = standing(talos, friction=model)
+        mu = SOLE["mu"]
+        push = 2.0 * mu * robot.getMass() * 9.81
+        result = share(robot, talos_standing, (push, push))
+        assert result.status == DistributionStatus.Relaxed
+        forces[model] = [contact.force for contact in result.contacts]
+        assert all(
+            robot.getContactFrictionUsage(side) == pytest.approx(1.0) or not force.any()
+            for side, force in zip(("left", "right"), forces[model], strict=True)
+        )
+    for force in forces[FrictionModel.Cone]:
+        assert np.hypot(*force[:2]) <= mu * force[2] * (1.0 + 1e-9)
+    assert any(
+        np.hypot(*force[:2]) > 1.1 * mu * force[2] for force in forces[FrictionModel.OuterPyramid]
+    )
+
+
+def test_many_facets_are_as_good_as_the_cone(talos, talos_standing):
+    push = (60.0, 40.0)
+    cone = share(standing(talos, friction=FrictionModel.Cone), talos_standing, push)
+    facets = share(standing(talos, friction=FrictionModel.Facets, facets=64), talos_standing, push)
+    assert cone.status == facets.status
+    assert_allclose(facets.achieved, cone.achieved, atol=0.5)
+
+
+def test_a_reference_is_kept_where_it_gives_the_wrench(talos, talos_standing):
+    plain = share(standing(talos), talos_standing)
+    robot = standing(talos)
+    offset = np.array([0.0, 5.0, 0.0, 0.0, 0.0, 0.0])
+    for side, contact, sign in zip(("left", "right"), plain.contacts, (1.0, -1.0), strict=True):
+        settings = robot.getContact(side).getSettings()
+        settings.reference = contact.force + sign * offset
+        robot.getContact(side).initialize(settings)
+    pressed = share(robot, talos_standing)
+    assert pressed.status == DistributionStatus.Solved
+    assert pressed.cost < plain.cost
+    assert pressed.contacts[0].set is not None
+    assert robot.getContact("left").getSet() == pressed.contacts[0].set
+
+
+def test_bounds_of_the_normal_force(talos, talos_standing):
+    weight = standing(talos).getMass() * 9.81
+    robot = standing(talos, greatest_normal_force=0.4 * weight)
+    result = share(robot, talos_standing)
+    assert result.status == DistributionStatus.Relaxed
+    assert_allclose([contact.force[2] for contact in result.contacts], 0.4 * weight)
+
+
+def test_a_hand_that_pulls(talos, talos_standing):
+    robot = standing(talos)
+    push = (0.5 * robot.getMass() * 9.81, 0.0)
+    assert share(robot, talos_standing, push).status == DistributionStatus.Relaxed
+    settings = dynacom.ContactGraspSettings()
+    settings.lower, settings.upper = [-500.0] * 3 + [50.0] * 3, [500.0] * 3 + [50.0] * 3
+    with pytest.raises(ValueError, match=r"ContactGraspSettings\.frame_name"):
+        dynacom.ContactGrasp(settings)
+    settings.lower = [-500.0] * 3 + [-50.0] * 3
+    settings.frame_name = "gripper_right_base_link"
+    robot.addContact(dynacom.ContactGrasp(settings), "hand")
+    held = share(robot, talos_standing, push)
+    assert held.status == DistributionStatus.Solved
+    assert np.all(np.abs(held.contacts[2].force) <= np.asarray(settings.upper) * (1.0 + 1e-12))
+
+
+def test_a_polygon_and_a_placement(talos, talos_standing):
+    sole = sole_settings(**SOLE)
+    x, y = sole.half_length, sole.half_width
+    placement = pin.SE3(np.eye(3), np.array([0.02, 0.0, 0.0]))
+    robot = dynacom.DynaCoM(talos.model)
+    for side in ("left", "right"):
+        settings = dynacom.ContactPolygonSettings()
+        settings.mu, settings.gu = sole.mu, sole.gu
+        settings.vertices = [[x - 0.02, y], [-x - 0.02, y], [-x - 0.02, -y], [x - 0.02, -y]]
+        settings.placement = placement
+        settings.weights = sole.weights
+        settings.frame_name = f"{side}_sole_link"
+        robot.addContact(dynacom.ContactPolygon(settings), side)
+        assert len(robot.getContact(side).getCorners()) == 4
+    moved = share(robot, talos_standing)
+    plain = share(standing(talos), talos_standing)
+    # The same places are pressed on, though costs are of moments about another point.
+    assert moved.status == plain.status == DistributionStatus.Solved
+    assert_allclose(moved.achieved, plain.achieved, atol=1e-6)
