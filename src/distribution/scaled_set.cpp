@@ -404,7 +404,8 @@ bool ScaledSet::expose(const Vector6& direction, double tolerance, ScaledSet& fa
   if (is_grasp_) {
     face.lower_ = (direction.array() > tolerance).select(upper_, lower_);
     face.upper_ = (direction.array() < -tolerance).select(lower_, upper_);
-    const auto is_up = direction.array() > tolerance, is_down = direction.array() < -tolerance;
+    const auto is_up = direction.array() > tolerance;
+    const auto is_down = direction.array() < -tolerance;
     return is_up.select(upper_, 0.).allFinite() && is_down.select(lower_, 0.).allFinite();
   }
   face.friction_ = friction_.expose(direction.head<2>(), tolerance);

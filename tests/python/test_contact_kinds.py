@@ -10,7 +10,6 @@ import dynacom
 from dynacom import DistributionStatus, FrictionModel
 from helpers import sole_settings
 
-
 SOLE = {"mu": 0.5, "gu": 0.05, "half_length": 0.1, "half_width": 0.06}
 
 
@@ -18,7 +17,7 @@ def standing(talos, **fields) -> dynacom.DynaCoM:
     """Talos on both soles, with settings that are other than by default."""
     robot = dynacom.DynaCoM(talos.model)
     for side in ("left", "right"):
-        settings = sole_settings(**SOLE, frame_name=f"{side}_sole_link")
+        settings = sole_settings(**SOLE, frame_name=f"leg_{side}_sole_fix_joint")
         for name, value in fields.items():
             setattr(settings, name, value)
         robot.addContact(dynacom.Contact6D(settings), side)
@@ -117,7 +116,7 @@ def test_a_polygon_and_a_placement(talos, talos_standing):
         settings.vertices = [[x - 0.02, y], [-x - 0.02, y], [-x - 0.02, -y], [x - 0.02, -y]]
         settings.placement = placement
         settings.weights = sole.weights
-        settings.frame_name = f"{side}_sole_link"
+        settings.frame_name = f"leg_{side}_sole_fix_joint"
         robot.addContact(dynacom.ContactPolygon(settings), side)
         assert len(robot.getContact(side).getCorners()) == 4
     moved = share(robot, talos_standing)
