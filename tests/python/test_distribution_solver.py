@@ -146,7 +146,6 @@ def test_mirrored_problems_have_mirrored_answers(kind):
             assert_allclose(image, MIRROR[: force.size] * force, atol=1e-6 * unit)
 
 
-@pytest.mark.xfail(strict=True, reason="out of reach, some of these end as NumericalFailure")
 def test_a_grasp_without_a_lower_bound():
     """It is as one without an upper bound that holds the other way round."""
     lower, upper = np.full(6, -1.0), np.full(6, 1.0)
