@@ -8,6 +8,7 @@
 
 #include "distribution/scaled_set.hpp"
 #include "dynacom/distribution_solver.hpp"
+#include "dynacom/wrench_distribution.hpp"
 #include "malloc_counter.hpp"
 #include "random_problems.hpp"
 #include "set_problems.hpp"
