@@ -92,7 +92,10 @@ void describe(const std::vector<Contact>& contacts, DistributionProblem& problem
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const Contact& contact = contacts[k];
     DistributionProblem::Contact& described = problem.contacts[k];
-    described.set = contact.set ? *contact.set : describePyramid(contact.A);
+    if (!contact.set)
+      described.set = describePyramid(contact.A);
+    else if (described.set != *contact.set)
+      described.set = *contact.set;
     described.weights = contact.weights;
     described.reference = contact.reference;
     described.rotation = contact.NE.topLeftCorner<3, 3>();

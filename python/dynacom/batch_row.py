@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pinocchio as pin
 
 from dynacom.analysis_options import AnalysisOptions
 from dynacom.batch_files import printable
@@ -22,6 +23,7 @@ from dynacom.dynacom_pywrap import (
     Contact6DSettings,
     ContactPointSettings,
     DistributionStatus,
+    FrictionModel,
     __version__,
 )
 from dynacom.motion_report import FAULTS, MotionReport, window_times
@@ -219,10 +221,20 @@ def _fields(settings: Any) -> dict[str, Any]:
 
 
 def _jsonable(settings: Any) -> dict[str, Any]:
-    return {
-        name: value.tolist() if isinstance(value, np.ndarray) else value
-        for name, value in _fields(settings).items()
-    }
+    return {name: _plain(value) for name, value in _fields(settings).items()}
+
+
+def _plain(value: Any) -> Any:
+    """Of a setting, what JSON has; no bound is null."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, pin.SE3):
+        return value.homogeneous.tolist()
+    if isinstance(value, FrictionModel):
+        return str(value)
+    if isinstance(value, float) and math.isinf(value):
+        return None
+    return value
 
 
 def _digest_bodies(robot: Robot) -> str:
