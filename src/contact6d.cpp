@@ -114,16 +114,34 @@ void Contact6D::change(Value Contact6DSettings::*field, const Value& value) {
 }
 
 void Contact6D::updateMatrices() {
-  const Eigen::Vector2d half(settings_.half_length, settings_.half_width);
-  const Section places = Section::rectangle(-half, half);
-  ContactSet set = ContactSet::surface(settings_.makeFriction(settings_.mu), places, settings_.gu);
-  set.boundNormalForce(settings_.least_normal_force, settings_.greatest_normal_force);
-  const internal::SurfaceMatrices matrices = internal::listInequalities(set, &places);
-  if (internal::isPyramid(set) && settings_.reference.isZero(0.))
-    setMatrices(matrices.uni_A, matrices.fri_A, settings_.weights);
-  else
+  const double dx = settings_.half_length;
+  const double dy = settings_.half_width;
+  if (!internal::isPyramid(settings_) || !settings_.reference.isZero(0.)) {
+    const Section places = Section::rectangle({-dx, -dy}, {dx, dy});
+    ContactSet set =
+        ContactSet::surface(settings_.makeFriction(settings_.mu), places, settings_.gu);
+    set.boundNormalForce(settings_.least_normal_force, settings_.greatest_normal_force);
+    const internal::SurfaceMatrices matrices = internal::listInequalities(set, &places);
     setMatrices(matrices.uni_A, matrices.uni_b, matrices.fri_A, matrices.fri_b, settings_.weights,
                 settings_.reference, set);
+    return;
+  }
+  Eigen::Matrix<double, 5, 6> uni_A;
+  uni_A << 0., 0., -1., 0., 0., 0.,  //
+      0., 0., -dx, 0., -1., 0.,      //
+      0., 0., -dy, 1., 0., 0.,       //
+      0., 0., -dx, 0., 1., 0.,       //
+      0., 0., -dy, -1., 0., 0.;
+  const double mu = internal::getPyramidMu(settings_, settings_.mu);
+  const double gu = settings_.gu;
+  Eigen::Matrix<double, 6, 6> fri_A;
+  fri_A << 1., 0., -mu, 0., 0., 0.,  //
+      0., 1., -mu, 0., 0., 0.,       //
+      -1., 0., -mu, 0., 0., 0.,      //
+      0., -1., -mu, 0., 0., 0.,      //
+      0., 0., -gu, 0., 0., 1.,       //
+      0., 0., -gu, 0., 0., -1.;
+  setMatrices(uni_A, fri_A, settings_.weights);
 }
 
 }  // namespace dynacom

@@ -82,14 +82,22 @@ void ContactPoint::change(Value ContactPointSettings::*field, const Value& value
 }
 
 void ContactPoint::updateMatrices() {
-  ContactSet set = ContactSet::point(settings_.makeFriction(settings_.mu));
-  set.boundNormalForce(settings_.least_normal_force, settings_.greatest_normal_force);
-  const internal::SurfaceMatrices matrices = internal::listInequalities(set, nullptr);
-  if (internal::isPyramid(set) && settings_.reference.isZero(0.))
-    setMatrices(matrices.uni_A, matrices.fri_A, settings_.weights);
-  else
+  if (!internal::isPyramid(settings_) || !settings_.reference.isZero(0.)) {
+    ContactSet set = ContactSet::point(settings_.makeFriction(settings_.mu));
+    set.boundNormalForce(settings_.least_normal_force, settings_.greatest_normal_force);
+    const internal::SurfaceMatrices matrices = internal::listInequalities(set, nullptr);
     setMatrices(matrices.uni_A, matrices.uni_b, matrices.fri_A, matrices.fri_b, settings_.weights,
                 settings_.reference, set);
+    return;
+  }
+  const double mu = internal::getPyramidMu(settings_, settings_.mu);
+  const Eigen::RowVector3d uni_A(0., 0., -1.);
+  Eigen::Matrix<double, 4, 3> fri_A;
+  fri_A << 1., 0., -mu,  //
+      0., 1., -mu,       //
+      -1., 0., -mu,      //
+      0., -1., -mu;
+  setMatrices(uni_A, fri_A, settings_.weights);
 }
 
 }  // namespace dynacom

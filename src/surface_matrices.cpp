@@ -79,9 +79,4 @@ SurfaceMatrices listInequalities(const ContactSet& set, const Section* places) {
   return matrices;
 }
 
-bool isPyramid(const ContactSet& set) {
-  return set.isCone() && set.friction().shape() != Section::Shape::Disc &&
-         set.moments().shape() != Section::Shape::Disc;
-}
-
 }  // namespace dynacom::internal

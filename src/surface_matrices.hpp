@@ -18,7 +18,4 @@ struct SurfaceMatrices {
 /// @param places  where pressure may be, nothing for a point
 SurfaceMatrices listInequalities(const ContactSet& set, const Section* places);
 
-/// Whether a set is all that the inequalities say: a cone, without a curved boundary.
-bool isPyramid(const ContactSet& set);
-
 }  // namespace dynacom::internal

@@ -29,7 +29,7 @@ std::ostream& operator<<(std::ostream& out, FrictionModel model) { return out <<
 Section SurfaceOptions::makeFriction(double mu) const {
   switch (friction) {
     case FrictionModel::InnerPyramid:
-      return Section::facets(mu / std::sqrt(2.), 4);
+      return Section::facets(internal::getPyramidMu(*this, mu), 4);
     case FrictionModel::Facets:
       return Section::facets(mu, facets, facet_angle);
     case FrictionModel::Cone:
@@ -67,9 +67,10 @@ bool SurfaceOptions::operator==(const SurfaceOptions& other) const {
 
 namespace internal {
 
-void validate(const SurfaceOptions& options, const std::string& settings) {
+void validate(const SurfaceOptions& options, const char* settings) {
+  // Names are put together for messages only: a control loop may change settings.
   const auto require = [&](bool holds, const char* field, const char* expected, const auto& value) {
-    requireField(holds, (settings + '.' + field).c_str(), expected, value);
+    if (!holds) requireField(false, concat(settings, ".", field).c_str(), expected, value);
   };
   require(options.facets >= 4 && options.facets <= 64, "facets", "from 4 to 64", options.facets);
   require(std::isfinite(options.facet_angle), "facet_angle", "finite", options.facet_angle);
@@ -86,6 +87,16 @@ void validate(const SurfaceOptions& options, const std::string& settings) {
 }
 
 bool isPlain(const SurfaceOptions& options) { return options == SurfaceOptions(); }
+
+bool isPyramid(const SurfaceOptions& options) {
+  return (options.friction == FrictionModel::OuterPyramid ||
+          options.friction == FrictionModel::InnerPyramid) &&
+         options.least_normal_force == 0. && std::isinf(options.greatest_normal_force);
+}
+
+double getPyramidMu(const SurfaceOptions& options, double mu) {
+  return options.friction == FrictionModel::InnerPyramid ? mu / std::sqrt(2.) : mu;
+}
 
 void write(std::ostream& out, const SurfaceOptions& options) {
   static const SurfaceOptions plain;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <iosfwd>
-#include <string>
 
 #include "dynacom/surface_options.hpp"
 
@@ -10,10 +9,15 @@ namespace dynacom::internal {
 
 /// @param settings  name of the struct, for messages
 /// @throws std::invalid_argument naming the first field out of its range
-void validate(const SurfaceOptions& options, const std::string& settings);
+void validate(const SurfaceOptions& options, const char* settings);
 
-/// Whether the contact is a pyramid at its frame, without bounds.
+/// Whether the contact is the manual's pyramid at its frame, without bounds.
 bool isPlain(const SurfaceOptions& options);
+
+/// Whether friction is a pyramid of four sides, and the normal force has no bounds.
+bool isPyramid(const SurfaceOptions& options);
+/// The friction coefficient of that pyramid.
+double getPyramidMu(const SurfaceOptions& options, double mu);
 
 /// What is not as by default.
 void write(std::ostream& out, const SurfaceOptions& options);
