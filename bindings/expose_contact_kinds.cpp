@@ -92,16 +92,17 @@ void exposeContactKinds() {
                     "(6,), > 0.")
       .add_property("reference", getter(&Grasp::reference), setter(&Grasp::reference, "reference"),
                     "Force that the cost pulls to, (6,) [N], [N·m].")
-      .add_property("placement",
-                    bp::make_getter(&Grasp::placement,
-                                    bp::return_value_policy<bp::return_by_value>()),
-                    bp::make_setter(&Grasp::placement),
-                    "Of the grasp in the contact's frame (pinocchio.SE3).")
+      .add_property(
+          "placement",
+          bp::make_getter(&Grasp::placement, bp::return_value_policy<bp::return_by_value>()),
+          bp::make_setter(&Grasp::placement),
+          "Of the grasp in the contact's frame (pinocchio.SE3).")
       .def_readwrite("frame_name", &Grasp::frame_name, "Name of the frame; not empty.")
       .def(SettingsVisitor<Grasp>());
   expose<ContactGrasp, Grasp>(
       "ContactGrasp",
-      "A hand on a rail, a magnet, a suction cup: it gives a wrench (force [N], moment [N·m]) that\n"
+      "A hand on a rail, a magnet, a suction cup: it gives a wrench (force [N], moment [N·m]) "
+      "that\n"
       "pulls as well as it pushes, each component between bounds of its own.")
       .def(PrintVisitor<ContactGrasp>(&writeGrasp));
 }

@@ -63,9 +63,7 @@ std::string writeDistribution(const WrenchDistribution& distribution) {
       ", status=", distribution.result().status, ")");
 }
 
-bp::object getSet(const Contact& self) {
-  return self.set ? bp::object(*self.set) : bp::object();
-}
+bp::object getSet(const Contact& self) { return self.set ? bp::object(*self.set) : bp::object(); }
 bp::object getA(const Contact& self) { return toArray(self.A); }
 bp::object getNE(const Contact& self) { return toArray(self.NE); }
 bp::object getActive(const Contact& self) {

@@ -19,6 +19,7 @@
 #include "malloc_counter.hpp"
 #include "random_problems.hpp"
 #include "random_robot.hpp"
+#include "set_problems.hpp"
 
 using namespace dynacom;
 using namespace dynacom_tests;
@@ -612,4 +613,40 @@ BOOST_AUTO_TEST_CASE(kept_storage_allocates_only_to_become_larger_than_ever) {
                list[1].setZero(2);
                list[1].setZero(4);
              }) == 0);
+}
+
+BOOST_AUTO_TEST_CASE(problems_of_sets_that_change_allocate_nothing) {
+  for (std::size_t kind = 0; kind < kSetKindNames.size(); ++kind) {
+    SetProblemGenerator generator(5);
+    DistributionSolver solver;
+    for (int trial = 0; trial < 50; ++trial) {
+      SetProblem made = generator.next(static_cast<SetKind>(kind));
+      solver.solve(made.problem);
+      made.problem.wrench *= 1.01;
+      made.problem.contacts[0].lever.x() += 0.001;
+      BOOST_TEST(allocationsIn([&] { solver.solve(made.problem); }) == 0);
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(contacts_of_sets_share_wrenches_without_allocating) {
+  Contact6DSettings settings = makeSole("foot")->getSettings();
+  settings.friction = FrictionModel::Facets;
+  settings.greatest_normal_force = 700.;
+  Contact6D left(settings), right(settings);
+  WrenchDistribution distribution;
+  const auto tick = [&](double x) {
+    for (const auto& [contact, y] : {std::pair(&left, 0.1), std::pair(&right, -0.1)})
+      contact->updateNewtonEuler({x, 0., 0.9}, {Matrix3d::Identity(), Vector3d(0., y, 0.)});
+    distribution.clear();
+    distribution.add(left);
+    distribution.add(right);
+    Vector6 wrench = Vector6::Unit(2) * 900.;
+    wrench[0] = 4000. * x;
+    wrench[4] = -0.9 * wrench[0];
+    distribution.solve(wrench);
+  };
+  tick(0.);
+  for (int k = 0; k < 50; ++k)
+    BOOST_TEST(allocationsIn([&] { tick(0.01 * std::sin(0.1 * k)); }) == 0);
 }

@@ -12,7 +12,6 @@
 #include "dynacom/contact_point.hpp"
 #include "dynacom/contact_polygon.hpp"
 #include "dynacom/wrench_distribution.hpp"
-#include "malloc_counter.hpp"
 #include "test_tools.hpp"
 
 using namespace dynacom;
@@ -246,23 +245,4 @@ BOOST_AUTO_TEST_CASE(settings_out_of_range_are_named) {
   polygon.vertices.resize(2, 0);
   BOOST_TEST(throws<std::invalid_argument>([&] { polygon.validate(); },
                                            {"ContactPolygonSettings.vertices", "none"}));
-}
-
-BOOST_AUTO_TEST_CASE(a_tick_allocates_nothing) {
-  Contact6DSettings settings = sole();
-  settings.friction = FrictionModel::Facets;
-  settings.greatest_normal_force = 700.;
-  Contact6D left(settings), right(settings);
-  WrenchDistribution distribution;
-  const auto tick = [&](double x) {
-    left.updateNewtonEuler({x, 0., 0.9}, at(0.1));
-    right.updateNewtonEuler({x, 0., 0.9}, at(-0.1));
-    distribution.clear();
-    distribution.add(left);
-    distribution.add(right);
-    distribution.solve(wrenchOf(4000. * x, 0., 900.));
-  };
-  tick(0.);
-  for (int k = 0; k < 50; ++k)
-    BOOST_TEST(allocationsIn([&] { tick(0.01 * std::sin(0.1 * k)); }) == 0);
 }

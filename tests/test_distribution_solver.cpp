@@ -9,7 +9,6 @@
 #include "distribution/scaled_set.hpp"
 #include "dynacom/distribution_solver.hpp"
 #include "dynacom/wrench_distribution.hpp"
-#include "malloc_counter.hpp"
 #include "random_problems.hpp"
 #include "set_problems.hpp"
 #include "test_tools.hpp"
@@ -242,18 +241,4 @@ BOOST_AUTO_TEST_CASE(a_proof_is_none_for_other_forces) {
   other = solution;
   other.forces[0][0] = 0.6 * other.forces[0][2];
   BOOST_TEST(!other.isOptimal(problem));
-}
-
-BOOST_AUTO_TEST_CASE(nothing_is_allocated) {
-  for (std::size_t kind = 0; kind < kSetKindNames.size(); ++kind) {
-    SetProblemGenerator generator(5);
-    DistributionSolver solver;
-    for (int trial = 0; trial < 50; ++trial) {
-      SetProblem made = generator.next(static_cast<SetKind>(kind));
-      solver.solve(made.problem);
-      made.problem.wrench *= 1.01;
-      made.problem.contacts[0].lever.x() += 0.001;
-      BOOST_TEST(allocationsIn([&] { solver.solve(made.problem); }) == 0);
-    }
-  }
 }
