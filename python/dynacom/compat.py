@@ -27,11 +27,18 @@ ALIASES = {
 }
 
 
+# Fields that the old interface does not know.
+_LATER = (
+    *("friction", "facets", "facet_angle", "least_normal_force", "greatest_normal_force"),
+    *("placement", "reference"),
+)
+
+
 def get_settings(contact: Any) -> dict[str, Any]:
-    """The contact's settings as a dict: name of the field -> value (a copy)."""
+    """The contact's settings as a dict: name of the old field -> value (a copy)."""
     settings = contact.getSettings()
     fields = [name for name, kind in vars(type(settings)).items() if isinstance(kind, property)]
-    return {name: getattr(settings, name) for name in fields}
+    return {name: getattr(settings, name) for name in fields if name not in _LATER}
 
 
 def add_aliases() -> None:

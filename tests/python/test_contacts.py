@@ -19,6 +19,7 @@ from dynacom import (
     ContactPointSettings,
     DynacomError,
     DynaCoMSettings,
+    FrictionModel,
     NotReadyError,
 )
 from helpers import (
@@ -80,10 +81,26 @@ def state(contact: ContactBase) -> list:
 
 # Settings.
 
+OPTIONS = {
+    "friction": FrictionModel.OuterPyramid,
+    "facets": 8,
+    "facet_angle": 0,
+    "least_normal_force": 0,
+    "greatest_normal_force": np.inf,
+    "placement": pin.SE3.Identity(),
+}
 DEFAULTS = [
     (
         ContactPointSettings,
-        {"mu": 0, "weights": np.ones(3), "frame_name": "", "world_aligned": False, "radius": 0},
+        {
+            "mu": 0,
+            "weights": np.ones(3),
+            "frame_name": "",
+            "world_aligned": False,
+            "radius": 0,
+            "reference": np.zeros(3),
+            **OPTIONS,
+        },
     ),
     (
         Contact6DSettings,
@@ -94,6 +111,8 @@ DEFAULTS = [
             "half_width": 0,
             "weights": np.ones(6),
             "frame_name": "",
+            "reference": np.zeros(6),
+            **OPTIONS,
         },
     ),
     (DynaCoMSettings, {"urdf": "", "gravity": np.array([0, 0, -9.81])}),
@@ -107,6 +126,12 @@ OTHER_VALUES = {
     "frame_name": "sole",
     "urdf": "robot.urdf",
     "world_aligned": True,
+    "friction": FrictionModel.Cone,
+    "facets": 16,
+    "facet_angle": 0.125,
+    "least_normal_force": 5.0,
+    "greatest_normal_force": 500.0,
+    "placement": pin.SE3(np.eye(3), np.array([0.0, 0.25, 0.0])),
 }
 FIELDS = [(cls, field) for cls, defaults in DEFAULTS for field in defaults]
 
@@ -147,12 +172,15 @@ def test_settings_print_every_field(cls, field):
     settings = cls()
     before = str(settings)
     setattr(settings, field, other_value(settings, field))
-    assert f"{field}=" in before
+    # Options are printed where they are other than by default.
+    assert f"{field}=" in (str(settings) if field in OPTIONS or field == "reference" else before)
     assert str(settings) != before
     assert str(settings) == repr(settings) == settings.to_string()
     assert cls.__name__ in repr(settings)
-    if field in OTHER_VALUES:
-        assert str(OTHER_VALUES[field]).lower() in repr(settings)
+    if field in OTHER_VALUES and field != "placement":
+        value = OTHER_VALUES[field]
+        text = f"{value:g}" if isinstance(value, float) else str(value)
+        assert text.lower() in repr(settings).lower()
 
 
 @pytest.mark.parametrize(("cls", "field"), FIELDS)
