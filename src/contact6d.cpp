@@ -126,6 +126,8 @@ void Contact6D::updateMatrices() {
                 settings_.reference, set);
     return;
   }
+  // Of pyramids as the manual has them, whose settings a control loop may change: in sizes that the
+  // compiler knows, which allocate nothing.
   Eigen::Matrix<double, 5, 6> uni_A;
   uni_A << 0., 0., -1., 0., 0., 0.,  //
       0., 0., -dx, 0., -1., 0.,      //

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "newton_limits.hpp"
+#include "wrench_span.hpp"
 
 namespace dynacom::internal {
 
@@ -539,9 +540,8 @@ DualNewton::Vector6 DualNewton::solveRange(const Vector6& wrench) const {
   return range_ * factors_.solve(range_.transpose() * wrench);
 }
 
-// An orthonormal basis of the wrenches that the state can give, whatever it costs: one direction
-// after the other, of which the most is new; and zeros behind. Returns false if the rank is not
-// certain.
+// An orthonormal basis of the wrenches that the state can give, whatever it costs. Returns false if
+// the rank is not certain.
 bool DualNewton::findRange() {
   directions_.clear();
   for (const std::size_t slot : active_) {
@@ -551,27 +551,7 @@ bool DualNewton::findRange() {
     for (int i = 0; i < block.cone.size; ++i)
       if (block.is_free[i] != 0.) directions_.push_back(block.e.col(i).normalized());
   }
-  range_.setZero();
-  for (rank_ = 0; rank_ < 6; ++rank_) {
-    double most = 0.;
-    for (const Vector6& direction : directions_) {
-      const double norm = direction.squaredNorm();
-      if (!(norm > most)) continue;
-      most = norm;
-      range_.col(rank_) = direction;
-    }
-    most = std::sqrt(most);
-    if (most <= kDependent) {
-      range_.col(rank_).setZero();
-      return true;
-    }
-    if (most < kIndependent) return false;
-    auto basis = range_.col(rank_);
-    for (int k = 0; k < rank_; ++k) basis -= range_.col(k).dot(basis) * range_.col(k);
-    basis.normalize();
-    for (Vector6& direction : directions_) direction -= basis.dot(direction) * basis;
-  }
-  return true;
+  return findSpan(directions_, kIndependent, kDependent, range_, rank_);
 }
 
 // Whether multipliers of both stages have the signs that they must have, and forces are in their

@@ -9,6 +9,7 @@
 
 #include "../check.hpp"
 #include "../dual_newton.hpp"
+#include "../wrench_span.hpp"
 #include "scaled_set.hpp"
 
 namespace dynacom {
@@ -235,7 +236,7 @@ struct DistributionSolver::Workspace {
   std::vector<Block> blocks;
   Vector6 weights;  // D over its overall size
   Vector6 target;
-  double mean_compliance = 0.;
+  double mean_compliance = 0., largest_weight = 0.;  // of the cost, of all contacts
 
   // Of the multipliers at hand.
   Vector6 multipliers = Vector6::Zero(), achieved = Vector6::Zero();
@@ -257,7 +258,7 @@ struct DistributionSolver::Workspace {
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
   bool relax(const Vector6& guess);
-  bool spanFaces(Matrix6& basis, int& rank, Vector6& fixed, std::vector<Vector6>& directions);
+  bool spanFaces(Matrix6& basis, int& rank, Vector6& fixed);
   bool findResidual(Vector6& residual);
   std::vector<Vector6> directions;
 };
@@ -269,9 +270,10 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
   target = weights.cwiseProduct(problem.wrench) / unit;
   blocks.resize(problem.contacts.size());
   directions.reserve(6 * blocks.size());
-  double largest = 0.;
+  largest_weight = 0.;
   for (const auto& contact : problem.contacts)
-    largest = std::max(largest, contact.weights.size() > 0 ? contact.weights.maxCoeff() : 1.);
+    largest_weight =
+        std::max(largest_weight, contact.weights.size() > 0 ? contact.weights.maxCoeff() : 1.);
   mean_compliance = 0.;
   for (std::size_t k = 0; k < blocks.size(); ++k) {
     const DistributionProblem::Contact& contact = problem.contacts[k];
@@ -282,9 +284,9 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
     block.lever = contact.lever;
     Vector6 own = Vector6::Ones();
     if (contact.weights.size() > 0)
-      own.head(n) = contact.weights / largest;
+      own.head(n) = contact.weights / largest_weight;
     else
-      own.head(n) /= largest;
+      own.head(n) /= largest_weight;
     if (!block.is_described || block.weights != own || block.described != contact.set) {
       block.weights = own;
       block.inverse_weights = own.cwiseInverse();
@@ -441,40 +443,18 @@ DistributionStatus DistributionSolver::Workspace::search() {
                                     : DistributionStatus::NumericalFailure;
 }
 
-// An orthonormal basis of the wrenches that the faces span, one direction after the other, of which
-// the most is new, and the wrench that all forces in them share. Returns false if the rank is not
-// certain.
-bool DistributionSolver::Workspace::spanFaces(Matrix6& basis, int& rank, Vector6& fixed,
-                                              std::vector<Vector6>& found) {
-  found.clear();
+// An orthonormal basis of the wrenches that the faces span, and the wrench that all forces in them
+// share. Returns false if the rank is not certain.
+bool DistributionSolver::Workspace::spanFaces(Matrix6& basis, int& rank, Vector6& fixed) {
+  directions.clear();
   fixed.setZero();
   for (const Block& block : blocks) {
     const ScaledSet::Span span = block.face.span();
     fixed += weights.cwiseProduct(block.wrenchOf(span.fixed));
     for (int k = 0; k < span.count; ++k)
-      found.push_back(weights.cwiseProduct(block.wrenchOf(span.axes.col(k))).normalized());
+      directions.push_back(weights.cwiseProduct(block.wrenchOf(span.axes.col(k))).normalized());
   }
-  basis.setZero();
-  for (rank = 0; rank < 6; ++rank) {
-    double most = 0.;
-    for (const Vector6& direction : found) {
-      const double norm = direction.squaredNorm();
-      if (!(norm > most)) continue;
-      most = norm;
-      basis.col(rank) = direction;
-    }
-    most = std::sqrt(most);
-    if (most <= kDependent) {
-      basis.col(rank).setZero();
-      return true;
-    }
-    if (most < kIndependent) return false;
-    auto own = basis.col(rank);
-    for (int k = 0; k < rank; ++k) own -= basis.col(k).dot(own) * basis.col(k);
-    own.normalize();
-    for (Vector6& direction : found) direction -= own.dot(direction) * own;
-  }
-  return true;
+  return internal::findSpan(directions, kIndependent, kDependent, basis, rank);
 }
 
 // What is missing of the closest wrench, from the forces at hand and a guess: the part of the
@@ -495,7 +475,7 @@ bool DistributionSolver::Workspace::findResidual(Vector6& residual) {
     Matrix6 basis;
     int rank = 0;
     Vector6 fixed;
-    if (!spanFaces(basis, rank, fixed, directions) || rank == 6) return false;
+    if (!spanFaces(basis, rank, fixed) || rank == 6) return false;
     const auto spanned = basis.leftCols(rank);
     const Vector6 rest = target - fixed;
     const Vector6 former = residual;
@@ -621,9 +601,7 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   solution.achieved.setZero();
   solution.multipliers.setZero();
   solution.cost = 0.;
-  double largest = 0.;
-  for (const auto& contact : problem.contacts)
-    largest = std::max(largest, contact.weights.size() > 0 ? contact.weights.maxCoeff() : 1.);
+  const double largest = work.largest_weight;
   if (answered)
     solution.multipliers = unit * largest * largest * work.weights.cwiseProduct(work.multipliers);
   for (std::size_t k = 0; k < contacts; ++k) {
