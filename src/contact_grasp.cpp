@@ -6,13 +6,14 @@
 #include <pinocchio/spatial.hpp>
 
 #include "check.hpp"
+#include "rotation_check.hpp"
 
 namespace dynacom {
 
 using internal::requireField;
 
 void ContactGraspSettings::validate() const {
-  constexpr double kOrthonormal = 1e-6, kInfinity = ContactSet::kInfinity;
+  constexpr double kInfinity = ContactSet::kInfinity;
   requireField((lower.array() <= upper.array()).all() && (lower.array() < kInfinity).all() &&
                    (upper.array() > -kInfinity).all(),
                "ContactGraspSettings.lower", "<= upper", lower.transpose());
@@ -20,11 +21,8 @@ void ContactGraspSettings::validate() const {
                "finite and > 0", weights.transpose());
   requireField(reference.allFinite(), "ContactGraspSettings.reference", "finite",
                reference.transpose());
-  const Eigen::Matrix3d& rotation = placement.rotation();
-  requireField(
-      placement.translation().allFinite() &&
-          (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm() <= kOrthonormal,
-      "ContactGraspSettings.placement", "finite, its rotation orthonormal", placement);
+  requireField(placement.translation().allFinite() && internal::isOrthonormal(placement.rotation()),
+               "ContactGraspSettings.placement", "finite, its rotation orthonormal", placement);
   requireField(!frame_name.empty(), "ContactGraspSettings.frame_name", "a frame's name", "''");
 }
 

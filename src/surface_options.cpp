@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "check.hpp"
+#include "rotation_check.hpp"
 
 namespace dynacom {
 
@@ -78,11 +79,8 @@ void validate(const SurfaceOptions& options, const char* settings) {
           "least_normal_force", "finite and >= 0", options.least_normal_force);
   require(options.greatest_normal_force >= options.least_normal_force, "greatest_normal_force",
           ">= least_normal_force", options.greatest_normal_force);
-  const auto& rotation = options.placement.rotation();
-  constexpr double kOrthonormal = 1e-6;
   require(
-      options.placement.translation().allFinite() &&
-          (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm() <= kOrthonormal,
+      options.placement.translation().allFinite() && isOrthonormal(options.placement.rotation()),
       "placement", "finite, its rotation orthonormal", options.placement);
 }
 

@@ -9,6 +9,7 @@
 
 #include "../check.hpp"
 #include "../dual_newton.hpp"
+#include "../rotation_check.hpp"
 #include "../wrench_span.hpp"
 #include "scaled_set.hpp"
 
@@ -134,11 +135,9 @@ void DistributionProblem::validate() const {
     throwInvalid("wrench_weights must be finite and > 0, got ", wrench_weights.transpose());
   if (!(std::isfinite(minimal_scale) && minimal_scale >= 0.))
     throwInvalid("minimal_scale must be finite and >= 0, got ", minimal_scale);
-  constexpr double kOrthonormal = 1e-6;
   for (const Contact& contact : contacts) {
     const Index size = contact.set.size();
-    if (!((contact.rotation.transpose() * contact.rotation - Matrix3d::Identity()).norm() <=
-          kOrthonormal))
+    if (!internal::isOrthonormal(contact.rotation))
       throwInvalid("rotation must be orthonormal, got\n", contact.rotation);
     if (!contact.lever.allFinite())
       throwInvalid("lever must be finite, got ", contact.lever.transpose());
@@ -581,8 +580,7 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   const double wrench_size = normOf(problem.wrench);
   const double overall_weight =
       wrench_size > 0. ? normOf(D.cwiseProduct(problem.wrench)) / wrench_size : D.maxCoeff();
-  // Where a wrench says nothing of the unit, one newton is as good as any.
-  const double unit = scale > 0. ? scale / overall_weight : 1.;
+  const double unit = scale / overall_weight;
   work.iterations = 0;
   if (!problem.wrench.allFinite()) {
     solution.status = DistributionStatus::InvalidInput;
@@ -590,12 +588,14 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
     solution.status = wrench_size == 0. || D.cwiseProduct(problem.wrench).norm() <= kReach * scale
                           ? DistributionStatus::Solved
                           : DistributionStatus::NoContact;
+  } else if (scale == 0.) {
+    solution.status = DistributionStatus::Solved;  // by no forces at all
   } else {
     work.take(problem, unit, overall_weight);
     solution.status = work.search();
   }
   solution.iterations = work.iterations;
-  work.has_answer = contacts > 0 && (solution.status == DistributionStatus::Solved);
+  work.has_answer = contacts > 0 && scale > 0. && solution.status == DistributionStatus::Solved;
   const bool answered =
       work.has_answer || (contacts > 0 && solution.status == DistributionStatus::Relaxed);
   solution.achieved.setZero();
