@@ -14,7 +14,6 @@
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
 #include "nan.hpp"
-#include "surface_options.hpp"
 
 namespace dynacom {
 
@@ -44,6 +43,22 @@ const ContactPointSettings& settingsOf(const ContactBase& point) {
 
 pinocchio::SE3 makeOffset(const Eigen::Vector3d& offset) {
   return pinocchio::SE3(Eigen::Matrix3d::Identity(), offset);
+}
+
+// Gives a part the friction of its contact, where that is no outer pyramid, else a given one.
+template <class Settings>
+void takeFriction(const Settings& contact, const std::string& name, FrictionModel friction,
+                  SurfaceOptions& part) {
+  if (contact.least_normal_force > 0. || std::isfinite(contact.greatest_normal_force) ||
+      !contact.reference.isZero(0.))
+    throwInvalid(
+        "contact '", name,
+        "' must have neither bounds of its normal force nor a reference to be taken apart, "
+        "got ",
+        contact);
+  part.friction = contact.friction == FrictionModel::OuterPyramid ? friction : contact.friction;
+  part.facets = contact.facets;
+  part.facet_angle = contact.facet_angle;
 }
 
 // Numbers for joints, the same for those of which one moves the other.
@@ -270,7 +285,8 @@ double internal::findBodyFriction(const std::vector<FixedContact>& points) {
 }
 
 internal::ContactSplit internal::splitCarrier(const DynaCoM& robot,
-                                              const std::vector<BodyPoints>& bodies) {
+                                              const std::vector<BodyPoints>& bodies,
+                                              FrictionModel friction) {
   const pinocchio::Model& model = robot.getModel();
   ContactSplit split = {{}, {}, describeCarrier(robot)};
   const std::vector<FixedContact> contacts = std::move(split.carrier.contacts);
@@ -278,30 +294,26 @@ internal::ContactSplit internal::splitCarrier(const DynaCoM& robot,
   points.clear();
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const FixedContact& whole = contacts[k];
-    const auto requirePlain = [&](const auto& contact) {
-      if (contact.getSet() || !isPlain(contact.getSettings()))
-        throwInvalid("contact '", whole.name,
-                     "' must be an outer pyramid at its frame, without bounds and reference, to be "
-                     "taken apart, got ",
-                     contact.getSettings());
-    };
     if (const auto* point = dynamic_cast<const ContactPoint*>(whole.contact.get())) {
-      requirePlain(*point);
+      ContactPointSettings part = point->getSettings();
+      takeFriction(part, whole.name, friction, part);
       split.parts.push_back({whole.name, k, 0});
-      points.push_back(whole);
+      points.push_back(
+          {whole.name, std::make_shared<ContactPoint>(part), whole.joint, whole.placement});
     } else if (const auto* surface = dynamic_cast<const Contact6D*>(whole.contact.get())) {
-      requirePlain(*surface);
       const Eigen::Matrix2Xd corners = surface->getCorners();
       ContactPointSettings part;
+      takeFriction(surface->getSettings(), whole.name, friction, part);
       part.mu = surface->getSettings().mu;
       part.weights = std::sqrt(double(corners.cols())) * surface->getSettings().weights.head<3>();
       part.world_aligned = true;
+      const pinocchio::SE3 placement = whole.placement * surface->getSettings().placement;
       for (Eigen::Index i = 0; i < corners.cols(); ++i) {
         part.frame_name = whole.name + "." + kCorners[i];
         const Eigen::Vector3d corner(corners(0, i), corners(1, i), 0.);
         split.parts.push_back({part.frame_name, k, 0});
         points.push_back({part.frame_name, std::make_shared<ContactPoint>(part), whole.joint,
-                          whole.placement * makeOffset(corner)});
+                          placement * makeOffset(corner)});
       }
     } else {
       throwInvalid("contact '", whole.name,
@@ -317,6 +329,7 @@ internal::ContactSplit internal::splitCarrier(const DynaCoM& robot,
   }
 
   ContactPointSettings point;
+  point.friction = friction;
   point.mu = findBodyFriction(points);
   if (!points.empty()) point.weights = settingsOf(*points.front().contact).weights;
   point.world_aligned = true;
@@ -339,10 +352,11 @@ internal::ContactSplit internal::splitCarrier(const DynaCoM& robot,
   return split;
 }
 
-PartRobot splitContacts(const DynaCoM& robot, const std::vector<BodyPoints>& bodies) {
+PartRobot splitContacts(const DynaCoM& robot, const std::vector<BodyPoints>& bodies,
+                        FrictionModel friction) {
   if (!robot.isInitialized())
     throw NotReadyError("DynaCoM is used by splitContacts before initialize()");
-  internal::ContactSplit parts = internal::splitCarrier(robot, bodies);
+  internal::ContactSplit parts = internal::splitCarrier(robot, bodies, friction);
   const std::vector<std::string> names = robot.getKnownContacts();
   pinocchio::Model model = robot.getModel();
   std::vector<std::shared_ptr<ContactPoint>> points;

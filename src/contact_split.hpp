@@ -22,7 +22,8 @@ struct ContactSplit {
 };
 
 /// @throws as splitContacts()
-ContactSplit splitCarrier(const DynaCoM& robot, const std::vector<BodyPoints>& bodies = {});
+ContactSplit splitCarrier(const DynaCoM& robot, const std::vector<BodyPoints>& bodies = {},
+                          FrictionModel friction = FrictionModel::OuterPyramid);
 
 /// What a PartRobot has of one.
 ContactSplit describeSplit(const PartRobot& parts);

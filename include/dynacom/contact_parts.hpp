@@ -7,6 +7,7 @@
 
 #include "dynacom/collision_points.hpp"
 #include "dynacom/motion_analysis.hpp"
+#include "dynacom/surface_options.hpp"
 
 namespace dynacom {
 
@@ -29,19 +30,22 @@ struct DYNACOM_EXPORT PartRobot {
   std::size_t countContacts() const;
 };
 
-/// Takes the contacts of a robot apart. A ContactPoint is a part of its own, as it is. A Contact6D
-/// is one part for each of its corners, `front_left`, `front_right`, `rear_left` and `rear_right`
-/// (x is forward, y is left): points whose normal is vertical, with the surface's μ. The weights of
-/// their forces are those of the surface times √4, so that an evenly loaded surface costs as much;
-/// γ is left to the corners' friction.
+/// Takes the contacts of a robot apart. A ContactPoint is a part of its own, where it is. A
+/// Contact6D is one part for each of its corners, `front_left`, `front_right`, `rear_left` and
+/// `rear_right` (x is forward, y is left): points whose normal is vertical, with the surface's μ.
+/// The weights of their forces are those of the surface times √4, so that an evenly loaded surface
+/// costs as much; γ is left to the corners' friction.
 ///
 /// Bodies are points, too, each of which pushes along the vertical, with the least μ of the
 /// contacts and the weights of the first part of these; where the robot has no contacts, with μ =
 /// 0.7 and weights of 1. Each body is a limb of its own.
-/// @throws std::invalid_argument if a contact is of another kind, or a body's joint is none of the
-///         model's; NotReadyError before the robot's initialize()
+/// @param friction  of bodies, and of contacts that are outer pyramids; others keep their own
+/// @throws std::invalid_argument if a contact is of another kind, or has bounds of its normal force
+///         or a reference, or a body's joint is none of the model's; NotReadyError before the
+///         robot's initialize()
 DYNACOM_EXPORT PartRobot splitContacts(const DynaCoM& robot,
-                                       const std::vector<BodyPoints>& bodies = {});
+                                       const std::vector<BodyPoints>& bodies = {},
+                                       FrictionModel friction = FrictionModel::OuterPyramid);
 
 /// What the contacts of a robot do, from what their parts do: a contact is active if any of its
 /// parts is, and its wrench is the sum of theirs, in its own axes about its own origin. The forces
