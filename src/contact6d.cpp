@@ -116,10 +116,9 @@ void Contact6D::change(Value Contact6DSettings::*field, const Value& value) {
 void Contact6D::updateMatrices() {
   const double dx = settings_.half_length;
   const double dy = settings_.half_width;
+  const Section places = Section::rectangle({-dx, -dy}, {dx, dy});
+  ContactSet set = ContactSet::surface(settings_.makeFriction(settings_.mu), places, settings_.gu);
   if (!internal::isPyramid(settings_) || !settings_.reference.isZero(0.)) {
-    const Section places = Section::rectangle({-dx, -dy}, {dx, dy});
-    ContactSet set =
-        ContactSet::surface(settings_.makeFriction(settings_.mu), places, settings_.gu);
     set.boundNormalForce(settings_.least_normal_force, settings_.greatest_normal_force);
     const internal::SurfaceMatrices matrices = internal::listInequalities(set, &places);
     setMatrices(matrices.uni_A, matrices.uni_b, matrices.fri_A, matrices.fri_b, settings_.weights,
@@ -143,7 +142,7 @@ void Contact6D::updateMatrices() {
       0., -1., -mu, 0., 0., 0.,      //
       0., 0., -gu, 0., 0., 1.,       //
       0., 0., -gu, 0., 0., -1.;
-  setMatrices(uni_A, fri_A, settings_.weights);
+  setMatrices(uni_A, fri_A, settings_.weights, set);
 }
 
 }  // namespace dynacom

@@ -67,11 +67,21 @@ void ContactBase::setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
   reg_A_ = reg_A;
   reg_b_.setZero(cols());
   set_.reset();
+  is_pyramid_ = true;
   static std::atomic<std::uint64_t> revisions{0};  // in all threads
   revision_ = ++revisions;
   if (same_cols) return;
   ne_A_.setZero(6, cols());
   force_.setZero(cols());
+}
+
+void ContactBase::setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
+                              const Eigen::Ref<const Eigen::MatrixXd>& fri_A,
+                              const Eigen::Ref<const Eigen::VectorXd>& reg_A,
+                              const ContactSet& set) {
+  internal::requireSize("set", set.size(), reg_A.size(), "components (as many as reg_A)");
+  setMatrices(uni_A, fri_A, reg_A);
+  set_ = set;
 }
 
 void ContactBase::setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
@@ -84,12 +94,11 @@ void ContactBase::setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
   internal::requireSize("uni_b", uni_b.size(), uni_A.rows(), "components (rows of uni_A)");
   internal::requireSize("fri_b", fri_b.size(), fri_A.rows(), "components (rows of fri_A)");
   internal::requireSize("reg_b", reg_b.size(), reg_A.size(), "components (as many as reg_A)");
-  internal::requireSize("set", set.size(), reg_A.size(), "components (as many as reg_A)");
-  setMatrices(uni_A, fri_A, reg_A);
+  setMatrices(uni_A, fri_A, reg_A, set);
+  is_pyramid_ = false;
   uni_b_ = uni_b;
   fri_b_ = fri_b;
   reg_b_ = reg_b;
-  set_ = set;
 }
 
 void ContactBase::reset() {

@@ -82,8 +82,8 @@ void ContactPoint::change(Value ContactPointSettings::*field, const Value& value
 }
 
 void ContactPoint::updateMatrices() {
+  ContactSet set = ContactSet::point(settings_.makeFriction(settings_.mu));
   if (!internal::isPyramid(settings_) || !settings_.reference.isZero(0.)) {
-    ContactSet set = ContactSet::point(settings_.makeFriction(settings_.mu));
     set.boundNormalForce(settings_.least_normal_force, settings_.greatest_normal_force);
     const internal::SurfaceMatrices matrices = internal::listInequalities(set, nullptr);
     setMatrices(matrices.uni_A, matrices.uni_b, matrices.fri_A, matrices.fri_b, settings_.weights,
@@ -97,7 +97,7 @@ void ContactPoint::updateMatrices() {
       0., 1., -mu,       //
       -1., 0., -mu,      //
       0., -1., -mu;
-  setMatrices(uni_A, fri_A, settings_.weights);
+  setMatrices(uni_A, fri_A, settings_.weights, set);
 }
 
 }  // namespace dynacom

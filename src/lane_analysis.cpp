@@ -128,7 +128,7 @@ void write(const pinocchio::SE3& placement, double* numbers) {
 // The contacts that lanes know: pyramids at their frames.
 template <class Contact>
 const Contact* asPyramid(const ContactBase& contact) {
-  if (typeid(contact) != typeid(Contact) || contact.getSet()) return nullptr;
+  if (typeid(contact) != typeid(Contact) || !contact.isPyramid()) return nullptr;
   const auto& known = static_cast<const Contact&>(contact);
   return internal::isPlain(known.getSettings()) ? &known : nullptr;
 }

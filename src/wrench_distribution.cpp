@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "check.hpp"
-#include "dual_newton.hpp"
 #include "dynacom/distribution_solver.hpp"
 #include "two_stage.hpp"
 
@@ -15,7 +14,6 @@ namespace dynacom {
 
 namespace {
 
-using internal::DualNewton;
 using internal::kMultiplied;
 using internal::kReach;
 using internal::throwInvalid;
@@ -41,6 +39,7 @@ constexpr double kProof = 1e-8;
 constexpr double kMarginReach = 1e-11;
 constexpr double kMarginChange = 1e-10;
 constexpr int kMarginSteps = 50;
+constexpr Eigen::Index kNormal = 2;
 
 Vector6 weighted(const Vector6& weights, const Vector6& wrench) {
   return weights.cwiseProduct(wrench);
@@ -71,39 +70,20 @@ bool hasSets(const std::vector<Contact>& contacts) {
                      [](const Contact& contact) { return contact.set.has_value(); });
 }
 
-// The set of a contact that has none but its inequalities.
-ContactSet describePyramid(const Eigen::MatrixXd& A) {
-  const std::optional<internal::BoxCone> cone = internal::BoxCone::recognise(A);
-  if (!cone)
-    throwInvalid(
-        "contacts that are given by matrices alone, which are no pyramids, cannot share a "
-        "wrench with ones that have a set");
-  const auto limit = [&](std::size_t component) { return cone->sides[component].beta; };
-  const Eigen::Vector2d friction(limit(0), limit(1));
-  const Section section = Section::rectangle(-friction, friction);
-  if (cone->size == 3) return ContactSet::point(section);
-  const Eigen::Vector2d half(limit(4), limit(3));  // moments are (y, −x) f_z
-  return ContactSet::surface(section, Section::rectangle(-half, half), limit(5));
-}
+// Which inequalities bound a component of a pyramid: λᵢ from above or below, by its sign.
+struct Row {
+  Eigen::Index component;  // of the normal force where it is the third
+  signed char sign;
+  double factor;  // of the component, without sign
+};
 
-// Contacts as a problem for the solver of all sets; NE is [R 0; [p]×R R].
-void describe(const std::vector<Contact>& contacts, DistributionProblem& problem) {
-  problem.contacts.resize(contacts.size());
-  for (std::size_t k = 0; k < contacts.size(); ++k) {
-    const Contact& contact = contacts[k];
-    DistributionProblem::Contact& described = problem.contacts[k];
-    if (!contact.set)
-      described.set = describePyramid(contact.A);
-    else if (described.set != *contact.set)
-      described.set = *contact.set;
-    described.weights = contact.weights;
-    described.reference = contact.reference;
-    described.rotation = contact.NE.topLeftCorner<3, 3>();
-    described.lever.setZero();
-    for (int axis = 0; axis < 3; ++axis) {
-      const Eigen::Vector3d direction = contact.NE.col(axis).head<3>();
-      described.lever += 0.5 * direction.cross(Eigen::Vector3d(contact.NE.col(axis).tail<3>()));
-    }
+// Where a contact is, from its NE = [R 0; [p]×R R].
+void place(const Contact& contact, DistributionProblem::Contact& placed) {
+  placed.rotation = contact.NE.topLeftCorner<3, 3>();
+  placed.lever.setZero();
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d direction = contact.NE.col(axis).head<3>();
+    placed.lever += 0.5 * direction.cross(Eigen::Vector3d(contact.NE.col(axis).tail<3>()));
   }
 }
 
@@ -157,7 +137,13 @@ Eigen::VectorXd DistributionResult::forces() const {
 bool DistributionResult::isOptimal(double tolerance) const {
   if (hasSets(contacts)) {
     DistributionProblem problem;
-    describe(contacts, problem);
+    for (const Contact& contact : contacts) {
+      DistributionProblem::Contact& described = problem.contacts.emplace_back();
+      described.set = *contact.set;
+      described.weights = contact.weights;
+      described.reference = contact.reference;
+      place(contact, described);
+    }
     problem.wrench = wrench;
     problem.wrench_weights = wrench_weights;
     problem.minimal_scale = scale / wrench_weights.head<3>().maxCoeff();
@@ -257,8 +243,10 @@ struct WrenchDistribution::Workspace {
     // As last added: inequalities in two parts, those of a contact.
     Eigen::MatrixXd unilaterality, friction;
     Eigen::VectorXd weights, reference;
-    std::optional<ContactSet> set;
-    std::uint64_t revision = 0;  // of the contact, if it was one
+    std::optional<ContactSet> set;  // of contacts
+    bool is_pyramid = true;         // whether that is what inequalities say
+    std::vector<Row> sides;         // of a pyramid
+    std::uint64_t revision = 0;     // of the contact, if it was one
     NewtonEuler NE;
     bool changed = true;             // whether the last solve() knew other inequalities and weights
     bool moved = false;              // whether it knew another NE
@@ -286,11 +274,11 @@ struct WrenchDistribution::Workspace {
   double unit = 0., overall_weight = 1.;
   Vector6 wrench_weights = Vector6::Ones();
 
-  bool has_sets = false;                        // whether some contacts of the result have one
-  DistributionSolver sets;                      // for these
-  DistributionProblem problem;                  // and what it is asked
-  DualNewton newton;                            // for nearly all others
-  TwoStageSolver<double> solver;                // what that leaves
+  bool has_sets = false;        // whether some contacts of the result are more than pyramids
+  bool knows_all_sets = false;  // whether none of them is described by matrices alone
+  DistributionProblem problem;  // these, where their sets are known
+  DistributionSolver sets;
+  TwoStageSolver<double> solver;                // for others, and for pyramids what that leaves
   TwoStageSolver<long double> accurate_solver;  // several times slower
 
   Slot& findSlot(std::size_t slot);
@@ -298,12 +286,16 @@ struct WrenchDistribution::Workspace {
   void describe(Slot& slot, const ContactBase& contact);
   void describe(Slot& slot, const MatrixRef& unilaterality, const MatrixRef& friction,
                 const VectorRef& weights, const VectorRef& reference,
-                const std::optional<ContactSet>& set);
+                const std::optional<ContactSet>& set, bool is_pyramid);
+  static void listSides(Slot& slot);
   void reserve();
   void takeProblem();
   void rearrange();
-  bool distribute();
+  void takeSets();
+  bool distribute(double minimal_scale);
   bool distributeBySets(double minimal_scale);
+  void writeMultipliers(const DistributionSolution& solution);
+  bool isCertain(const DistributionSolution& solution) const;
   bool distributeRobustly();
   template <class Scalar>
   bool distributeBy(TwoStageSolver<Scalar>& solver);
@@ -380,7 +372,6 @@ void WrenchDistribution::reset() {
 
 void WrenchDistribution::forgetAnswers() {
   Workspace& work = use();
-  work.newton.forget();
   work.sets.forget();
   work.has_answer = false;
 }
@@ -409,17 +400,19 @@ WrenchDistribution::Workspace::Slot& WrenchDistribution::Workspace::takeSlot(std
 void WrenchDistribution::Workspace::describe(Slot& slot, const ContactBase& contact) {
   if (slot.revision == contact.getRevision()) return;
   describe(slot, contact.uni_A(), contact.fri_A(), contact.reg_A(), contact.reg_b(),
-           contact.getSet());
+           contact.getSet(), contact.isPyramid());
   slot.revision = contact.getRevision();
 }
 
 void WrenchDistribution::Workspace::describe(Slot& slot, const MatrixRef& unilaterality,
                                              const MatrixRef& friction, const VectorRef& weights,
                                              const VectorRef& reference,
-                                             const std::optional<ContactSet>& set) {
+                                             const std::optional<ContactSet>& set,
+                                             bool is_pyramid) {
   slot.revision = 0;
   if (areSame(slot.unilaterality, unilaterality) && areSame(slot.friction, friction) &&
-      areSame(slot.weights, weights) && areSame(slot.reference, reference) && slot.set == set)
+      areSame(slot.weights, weights) && areSame(slot.reference, reference) && slot.set == set &&
+      slot.is_pyramid == is_pyramid)
     return;
   const Eigen::Index rows = unilaterality.rows() + friction.rows(), cols = weights.size();
   const bool same_sizes = slot.rows() == rows && slot.weights.size() == cols;
@@ -428,12 +421,32 @@ void WrenchDistribution::Workspace::describe(Slot& slot, const MatrixRef& unilat
   slot.weights = weights;
   slot.reference = reference;
   slot.set = set;
+  slot.is_pyramid = is_pyramid;
   slot.changed = true;
+  listSides(slot);
   if (same_sizes) return;
   slot.NE.resize(6, cols);
   resize(slot.spare, rows, cols);
   slot.former_force.setZero(cols);
   reserve();
+}
+
+// Which inequalities bound a component of a pyramid that is known as a set.
+void WrenchDistribution::Workspace::listSides(Slot& slot) {
+  slot.sides.clear();
+  if (!slot.set || !slot.is_pyramid) return;
+  const auto list = [&](const Eigen::MatrixXd& A) {
+    for (Eigen::Index row = 0; row < A.rows(); ++row) {
+      Eigen::Index component = kNormal;
+      for (Eigen::Index i = 0; i < A.cols(); ++i)
+        if (i != kNormal && A(row, i) != 0.) component = i;
+      const double factor = A(row, component);
+      slot.sides.push_back(
+          {component, static_cast<signed char>(factor > 0. ? 1 : -1), std::abs(factor)});
+    }
+  };
+  list(slot.unilaterality);
+  list(slot.friction);
 }
 
 // Gets storage for problems with any of the slots.
@@ -448,7 +461,7 @@ void WrenchDistribution::Workspace::reserve() {
   added.reserve(slots.size());
   solved.reserve(slots.size());
   result.contacts.reserve(slots.size());
-  newton.reserve(slots.size());
+  problem.contacts.reserve(slots.size());
   solver.reserve(slots.size(), rows, cols, all_rows, all_cols);
   accurate_solver.reserve(slots.size(), rows, cols, all_rows, all_cols);
 }
@@ -487,8 +500,8 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
   Workspace& work = use();
   Workspace::Slot& taken = work.takeSlot(work.added.size());
   const Eigen::MatrixXd no_friction(0, A.cols());
-  work.describe(taken, A, no_friction, weights, Eigen::VectorXd::Zero(weights.size()),
-                std::nullopt);
+  work.describe(taken, A, no_friction, weights, Eigen::VectorXd::Zero(weights.size()), std::nullopt,
+                true);
   taken.NE = NE;
   taken.moved = true;
 }
@@ -508,17 +521,39 @@ void WrenchDistribution::Workspace::takeProblem() {
       contact.A.bottomRows(slot.friction.rows()) = slot.friction;
       contact.weights = slot.weights;
       contact.reference = slot.reference;
-      contact.set = slot.set;
-      newton.setContact(solved[k], contact);
       slot.changed = same = false;
     }
     if (slot.moved) contact.NE.swap(slot.NE);
     slot.moved = false;
   }
-  if (same) return;
-  has_sets = hasSets(result.contacts);
-  has_answer = false;
-  newton.setActive(solved, result.contacts);
+  if (!same) takeSets();
+  if (knows_all_sets)
+    for (std::size_t k = 0; k < solved.size(); ++k) place(result.contacts[k], problem.contacts[k]);
+}
+
+// Of contacts that are others than before.
+void WrenchDistribution::Workspace::takeSets() {
+  has_answer = has_sets = false;
+  knows_all_sets = true;
+  for (const std::size_t number : solved) {
+    has_sets = has_sets || !slots[number].is_pyramid;
+    knows_all_sets = knows_all_sets && slots[number].set;
+  }
+  if (has_sets && !knows_all_sets)
+    throwInvalid(
+        "contacts that are given by matrices alone cannot share a wrench with ones that are more "
+        "than pyramids");
+  sets.forget();
+  problem.contacts.resize(knows_all_sets ? solved.size() : 0);
+  for (std::size_t k = 0; k < solved.size(); ++k) {
+    const Slot& slot = slots[solved[k]];
+    result.contacts[k].set.reset();
+    if (has_sets) result.contacts[k].set = slot.set;
+    if (!knows_all_sets) continue;
+    problem.contacts[k].set = *slot.set;
+    problem.contacts[k].weights = slot.weights;
+    problem.contacts[k].reference = slot.reference;
+  }
 }
 
 // Puts away the shares of the contacts that took part, and gets those of the ones that do now.
@@ -535,26 +570,25 @@ void WrenchDistribution::Workspace::rearrange() {
 
 // Returns false if there is no answer. What an attempt from the last one has taken in vain comes on
 // top of the iterations that are allowed, and is counted where they leave room for it.
-bool WrenchDistribution::Workspace::distribute() {
-  result.status = newton.solve(result.contacts, weighted(settings, result.wrench) / result.scale,
-                               wrench_weights, warm_start, maximal_iterations);
-  result.iterations = newton.iterations() - newton.iterationsInVain();
-  bool answered = true;
-  if (result.status != DistributionStatus::NumericalFailure) {
-    newton.writeAnswer(result, unit, overall_weight);
-  } else if (!hasFiniteMatrices()) {
-    result.status = DistributionStatus::InvalidInput;
-    answered = false;
-  } else {
-    answered = distributeRobustly();
+bool WrenchDistribution::Workspace::distribute(double minimal_scale) {
+  bool answered = knows_all_sets && distributeBySets(minimal_scale);
+  if (has_sets) return answered;
+  const int in_vain = knows_all_sets ? sets.solution().iterations_in_vain : 0;
+  result.iterations -= in_vain;
+  if (!answered || !isCertain(sets.solution())) {
+    if (hasFiniteMatrices()) {
+      answered = distributeRobustly();
+    } else {
+      result.status = DistributionStatus::InvalidInput;
+      answered = false;
+    }
   }
-  result.iterations = std::min(result.iterations + newton.iterationsInVain(), maximal_iterations);
+  result.iterations = std::min(result.iterations + in_vain, maximal_iterations);
   return answered;
 }
 
-// Contacts some of which are more than pyramids.
+// Contacts whose sets are known.
 bool WrenchDistribution::Workspace::distributeBySets(double minimal_scale) {
-  dynacom::describe(result.contacts, problem);
   problem.wrench = result.wrench;
   problem.wrench_weights = settings;
   problem.minimal_scale = minimal_scale;
@@ -567,7 +601,7 @@ bool WrenchDistribution::Workspace::distributeBySets(double minimal_scale) {
   if (result.status != DistributionStatus::Solved && result.status != DistributionStatus::Relaxed)
     return false;
   result.achieved = solution.achieved;
-  result.residual = solution.residual;
+  result.residual = result.wrench - result.achieved;
   result.cost = solution.cost;
   result.wrench_multipliers = solution.multipliers;
   for (std::size_t k = 0; k < result.contacts.size(); ++k) {
@@ -577,7 +611,56 @@ bool WrenchDistribution::Workspace::distributeBySets(double minimal_scale) {
     contact.multipliers.setZero();
     contact.relaxation_multipliers.setZero();
   }
+  if (!has_sets) writeMultipliers(solution);
   return true;
+}
+
+// Multipliers of the inequalities that the forces are at: what W² λ = NEᵀ ν − Aᵀ μ and
+// NEᵀ D² r = Aᵀ μ' leave for each component, and last for the normal force.
+void WrenchDistribution::Workspace::writeMultipliers(const DistributionSolution& solution) {
+  const bool is_relaxed = solution.status == DistributionStatus::Relaxed;
+  const Vector6 distance = weighted(settings.cwiseAbs2(), solution.residual);
+  for (std::size_t k = 0; k < solved.size(); ++k) {
+    Contact& contact = result.contacts[k];
+    const auto& bounds = solution.bounds[k];
+    const auto write = [&](Eigen::Index row, const Row& side, double rest, double of_distance) {
+      contact.active[row] = true;
+      contact.multipliers[row] = rest / side.factor;
+      if (is_relaxed) contact.relaxation_multipliers[row] = std::max(0., of_distance / side.factor);
+    };
+    const auto findRest = [&](Eigen::Index i) {
+      return contact.NE.col(i).dot(result.wrench_multipliers) -
+             contact.weights[i] * contact.weights[i] * contact.force[i];
+    };
+    double rest_of_normal = 0., distance_of_normal = 0.;
+    Eigen::Index normal_row = -1;
+    const std::vector<Row>& sides = slots[solved[k]].sides;
+    for (std::size_t j = 0; j < sides.size(); ++j) {
+      const Row& side = sides[j];
+      const auto row = static_cast<Eigen::Index>(j);
+      if (bounds[side.component] != side.sign) continue;
+      if (side.component == kNormal) {
+        normal_row = row;
+        continue;
+      }
+      write(row, side, side.sign * findRest(side.component),
+            side.sign * contact.NE.col(side.component).dot(distance));
+      rest_of_normal += contact.A(row, kNormal) * contact.multipliers[row];
+      distance_of_normal += contact.A(row, kNormal) * contact.relaxation_multipliers[row];
+    }
+    if (normal_row >= 0)
+      write(normal_row, sides[static_cast<std::size_t>(normal_row)],
+            rest_of_normal - findRest(kNormal),
+            distance_of_normal - contact.NE.col(kNormal).dot(distance));
+  }
+}
+
+// Whether an answer for pyramids has all digits; else others may know it better.
+bool WrenchDistribution::Workspace::isCertain(const DistributionSolution& solution) const {
+  if (solution.is_accurate) return true;
+  const double distance = weighted(settings, solution.residual).norm() / result.scale;
+  return solution.status == DistributionStatus::Solved && distance <= kInaccuracy &&
+         result.isOptimal(kProof);
 }
 
 // Few problems need more digits than double has: those where contacts are nearly parallel, and
@@ -678,13 +761,11 @@ DistributionStatus WrenchDistribution::solve(const Vector6& wrench, double minim
   } else if (work.solved.empty()) {
     const bool zero = weighted_size <= kReach * result.scale;
     result.status = zero ? DistributionStatus::Solved : DistributionStatus::NoContact;
-  } else if (work.has_sets) {
-    answered = work.distributeBySets(minimalScale);
-  } else if (work.unit == 0.) {
+  } else if (!work.has_sets && work.unit == 0.) {
     work.has_answer = false;  // all forces are zero
     result.status = DistributionStatus::Solved;
   } else {
-    answered = work.distribute();
+    answered = work.distribute(minimalScale);
   }
 
   // Multipliers may be beyond the largest numbers where forces are not.

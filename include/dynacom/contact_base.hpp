@@ -88,8 +88,11 @@ class DYNACOM_EXPORT ContactBase {
   const Eigen::VectorXd& reg_A() const { return reg_A_; }
   const Eigen::VectorXd& reg_b() const { return reg_b_; }
 
-  /// The set of λ, where it is another than uni_A() λ ≤ 0, fri_A() λ ≤ 0.
+  /// The set of λ; nothing for kinds that are described by matrices alone.
   const std::optional<ContactSet>& getSet() const { return set_; }
+  /// Whether λ is in the pyramid uni_A() λ ≤ 0, fri_A() λ ≤ 0, and the cost pulls it to zero: then
+  /// distributions have a multiplier for each of these inequalities.
+  bool isPyramid() const { return is_pyramid_; }
 
   /// Number of these matrices, but for ne_A(): another one whenever they may have changed, and no
   /// other contact's unless they are copies of each other; 0 before there are any.
@@ -154,6 +157,11 @@ class DYNACOM_EXPORT ContactBase {
                    const Eigen::Ref<const Eigen::MatrixXd>& fri_A,
                    const Eigen::Ref<const Eigen::VectorXd>& reg_A);
 
+  /// The same for one whose pyramid is known as a set.
+  void setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
+                   const Eigen::Ref<const Eigen::MatrixXd>& fri_A,
+                   const Eigen::Ref<const Eigen::VectorXd>& reg_A, const ContactSet& set);
+
   /// The same for a contact of another set, or with a force that the cost pulls to.
   /// @param uni_b, fri_b, reg_b  right-hand sides
   /// @param set  set.size() components
@@ -184,6 +192,7 @@ class DYNACOM_EXPORT ContactBase {
   std::uint64_t revision_ = 0;
   Eigen::VectorXd uni_b_, fri_b_, reg_b_;
   std::optional<ContactSet> set_;
+  bool is_pyramid_ = false;
   Eigen::Matrix<double, 6, Eigen::Dynamic> ne_A_;
   FrameIndex frame_id_ = kUnknownFrame;
   SE3 pose_ = SE3::Identity();

@@ -59,7 +59,18 @@ struct DYNACOM_EXPORT DistributionSolution {
   /// in the metric of W, on its set, or where the wrench is out of reach, on the face of that in
   /// which NEᵀ D² residual · λ is largest.
   Vector6 multipliers = Vector6::Zero();
-  int iterations = 0;
+  /// Of each contact and component the bound that it is at, −1 or 1, or 0: of f_z its own bounds,
+  /// of others those that grow with it. Of sections that are no rectangles both components are 1 on
+  /// the boundary. There, W² (λ − λ₀) − NEᵀ ν is what the bounds push with.
+  std::vector<Eigen::Matrix<signed char, 6, 1>> bounds;
+  int iterations = 0;  ///< steps of Newton's method
+  /// How many of these were tried from the last answer, and led nowhere: the others are what a
+  /// search without it takes.
+  int iterations_in_vain = 0;
+  /// Whether the answer has all digits that doubles have: not where only the proximal point method
+  /// has led to it, and, of Relaxed ones, next to the boundary and where rounding decides what the
+  /// residual exposes.
+  bool is_accurate = false;
 
   /// Whether this is the answer to a problem, judged by nothing but both: forces in their sets; no
   /// reachable wrench closer (the support functions of the sets in the direction of the residual
@@ -82,7 +93,7 @@ class DYNACOM_EXPORT DistributionSolver {
   ~DistributionSolver();
 
   /// How many steps of Newton's method a problem may take unless setMaximalIterations() says
-  /// otherwise.
+  /// otherwise; those that are tried from the last answer, as many at most, come on top.
   static constexpr int kMaximalIterations = 100000;
 
   /// @throws std::invalid_argument unless > 0
@@ -98,6 +109,9 @@ class DYNACOM_EXPORT DistributionSolver {
   /// @param problem  whose validate() would not throw; that is not looked at here
   /// @return the answer, until the next call; InvalidInput if a wrench or a placement is not finite
   const DistributionSolution& solve(const DistributionProblem& problem);
+
+  /// What the last solve() has returned.
+  const DistributionSolution& solution() const;
 
  private:
   struct Workspace;

@@ -30,8 +30,8 @@ struct DYNACOM_EXPORT DistributionResult {
     /// Which inequalities the answer was found with as equations, m. Others may be equations, too,
     /// where more meet than are needed.
     Eigen::Array<bool, Eigen::Dynamic, 1> active;
-    /// The contact's set, where A λ ≤ 0 alone does not describe it; then inequalities have no
-    /// multipliers, and none is active: isOptimal() asks the set.
+    /// The contact's set, where some contacts are more than A λ ≤ 0; then inequalities have no
+    /// multipliers, and none is active: isOptimal() asks the sets.
     std::optional<ContactSet> set;
     Eigen::VectorXd reference;  ///< λ₀ of the cost ½ Σ (wᵢ (λ − λ₀)ᵢ)², n
     /// Multipliers μ of the inequalities in the minimum of the cost, m: zero where one is not

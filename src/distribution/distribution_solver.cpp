@@ -2,13 +2,15 @@
 #include "dynacom/distribution_solver.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include "../check.hpp"
-#include "../dual_newton.hpp"
+#include "../factors6.hpp"
 #include "../rotation_check.hpp"
 #include "../wrench_span.hpp"
 #include "scaled_set.hpp"
@@ -43,10 +45,11 @@ constexpr double kFarApart = 4.;
 constexpr int kMaximalCuts = 40, kMaximalSteps = 60;
 // What part of the largest pivot of the compliance the least must be for a step without slack.
 constexpr double kFullRank = 1e-9;
-constexpr int kFreeSteps = 3;
+// How many steps are tried without slack, from all forces inside and from the last answer.
+constexpr int kFreeSteps = 2, kWarmSteps = 2;
 // The slack of the proximal point method, over the mean compliance: the first, the least, by which
 // it falls where the residual falls less than fivefold, and how many.
-constexpr double kFirstSlack = 1e-3, kLeastSlack = 1e-14, kSlackFactor = 0.05, kFall = 0.2;
+constexpr double kFirstSlack = 1e-4, kLeastSlack = 1e-14, kSlackFactor = 0.05, kFall = 0.2;
 constexpr int kMaximalRounds = 40;
 // On faces, and how often it may fall there until the faces are the wrong ones.
 constexpr double kFaceSlack = 1e-5;
@@ -56,6 +59,10 @@ constexpr int kSlowRounds = 4;
 constexpr double kIndependent = 1e-6, kDependent = 1e-11;
 // Of the residual, a component that exposes a face.
 constexpr double kExposed = 1e-9;
+// One that surely does not, and one that surely does, beyond rounding; and how far the closest
+// wrench has to be away, times the ratio of wrench weights, so that its direction has digits
+// enough.
+constexpr double kSurelyNone = 1e-12, kSurelyExposed = 1e-8, kFar = 1e-4;
 constexpr int kResidualSteps = 20;
 
 double normOf(const Vector6& wrench) {
@@ -69,52 +76,114 @@ Matrix3d skew(const Vector3d& v) {
   return matrix;
 }
 
+// Calls a function with the number of a contact's components, which the compiler knows then.
+template <class Function>
+void withSize(int size, Function function) {
+  if (size == 6)
+    function(std::integral_constant<int, 6>());
+  else
+    function(std::integral_constant<int, 3>());
+}
+
+// Adds [a b] J [a b]ᵀ for a symmetric J.
+template <class Columns, class Sum>
+void addPair(const Columns& columns, const Matrix2d& J, Sum&& sum) {
+  const auto a = columns.col(0), b = columns.col(1);
+  if (J(0, 1) != 0.) {
+    const Eigen::Matrix<double, Columns::RowsAtCompileTime, 2> both = columns * J;
+    sum.noalias() += both * columns.transpose();
+    return;
+  }
+  if (J(0, 0) != 0.) sum.noalias() += J(0, 0) * a * a.transpose();
+  if (J(1, 1) != 0.) sum.noalias() += J(1, 1) * b * b.transpose();
+}
+
+// A contact in units of its cost, x = W λ.
 struct Block {
   int size = 3;
   bool is_described = false;
-  Matrix3d rotation;
-  Vector3d lever;
-  Vector6 weights, inverse_weights;  // W over the largest weight of all
   ContactSet described;              // what `set` is made of
-  Vector6 reference;                 // W λ₀ over the unit
+  Vector6 weights, inverse_weights;  // W over the largest weight of all
+  bool has_reference = false;
+  Vector6 reference;            // W λ₀ over the unit
+  Matrix6 e = Matrix6::Zero();  // D NE W⁻¹
   ScaledSet set, face;
-  Vector6 pull;  // what the projection is of
+  Vector6 pull = Vector6::Zero();  // what the projection is of
   ScaledSet::Response response;
 
-  // W⁻¹ NEᵀ y.
-  Vector6 pullOf(const Vector6& y) const {
-    Vector6 pull = Vector6::Zero();
-    pull.head<3>().noalias() =
-        rotation.transpose() * (y.head<3>() + Vector3d(y.tail<3>()).cross(lever));
-    if (size == 6) pull.tail<3>().noalias() = rotation.transpose() * y.tail<3>();
-    return pull.cwiseProduct(inverse_weights);
+  void place(const DistributionProblem::Contact& contact, const Vector6& wrench_weights) {
+    const auto of_force = wrench_weights.head<3>(), of_moment = wrench_weights.tail<3>();
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vector3d direction = contact.rotation.col(axis);
+      const double force = inverse_weights[axis];
+      e.col(axis).head<3>() = force * of_force.cwiseProduct(direction);
+      e.col(axis).tail<3>() = force * of_moment.cwiseProduct(contact.lever.cross(direction));
+      if (size == 6)
+        e.col(3 + axis).tail<3>() = inverse_weights[3 + axis] * of_moment.cwiseProduct(direction);
+    }
   }
 
-  // NE W⁻¹ x.
+  // eᵀ ν.
+  Vector6 pullOf(const Vector6& nu) const {
+    Vector6 pull = Vector6::Zero();
+    withSize(size, [&](auto n) {
+      pull.template head<n>().noalias() = e.template leftCols<n>().transpose() * nu;
+    });
+    return pull;
+  }
+
+  // e x.
   Vector6 wrenchOf(const Vector6& x) const {
-    const Vector6 force = x.cwiseProduct(inverse_weights);
     Vector6 wrench;
-    const Vector3d push = rotation * force.head<3>();
-    wrench.head<3>() = push;
-    wrench.tail<3>() = lever.cross(push);
-    if (size == 6) wrench.tail<3>().noalias() += rotation * force.tail<3>();
+    withSize(size,
+             [&](auto n) { wrench.noalias() = e.template leftCols<n>() * x.template head<n>(); });
     return wrench;
   }
 
-  // Adds NE W⁻¹ J W⁻¹ NEᵀ for J = diag(of_force, of_moment).
-  void addCompliance(const Matrix3d& of_force, const Matrix3d& of_moment, Matrix6& sum) const {
-    const auto turn = [&](const Matrix3d& matrix, const auto& scales) {
-      const Matrix3d scaled = rotation * scales.asDiagonal();
-      return Matrix3d(scaled * matrix * scaled.transpose());
-    };
-    const Matrix3d force = turn(of_force, inverse_weights.head<3>());
-    const Matrix3d cross = skew(lever);
-    const Matrix3d coupling = cross * force;
-    sum.topLeftCorner<3, 3>() += force;
-    sum.bottomLeftCorner<3, 3>() += coupling;
-    sum.topRightCorner<3, 3>() += coupling.transpose();
-    sum.bottomRightCorner<3, 3>() += coupling * cross.transpose();
-    if (size == 6) sum.bottomRightCorner<3, 3>() += turn(of_moment, inverse_weights.tail<3>());
+  // Adds e eᵀ.
+  void addFreeCompliance(Matrix6& sum) const {
+    sum.noalias() += e.leftCols<3>() * e.leftCols<3>().transpose();
+    if (size == 6) {
+      const auto moments = e.bottomRightCorner<3, 3>();
+      sum.bottomRightCorner<3, 3>().noalias() += moments * moments.transpose();
+    }
+  }
+
+  // Adds e diag(friction, 0, moments, yaw) eᵀ.
+  void addCompliance(const Matrix2d& friction, const Matrix2d& moments, double yaw,
+                     Matrix6& sum) const {
+    addPair(e.leftCols<2>(), friction, sum);
+    if (size == 3) return;
+    auto of_moment = sum.bottomRightCorner<3, 3>();
+    addPair(e.block<3, 2>(3, 3), moments, of_moment);
+    if (yaw != 0.) of_moment.noalias() += yaw * e.col(5).tail<3>() * e.col(5).tail<3>().transpose();
+  }
+
+  // Adds e J eᵀ with J the Jacobian of the projection.
+  void addCompliance(Matrix6& sum) const {
+    if (response.is_free) {
+      addFreeCompliance(sum);
+      return;
+    }
+    addCompliance(response.of_friction, response.of_moments, response.of_yaw, sum);
+    if (response.inverse_stiffness == 0.) return;
+    const Vector6 growth = wrenchOf(response.growth);
+    sum.noalias() += response.inverse_stiffness * growth * growth.transpose();
+  }
+
+  // Of each component what decides at which bound it is: what makes the distance smaller, or else
+  // the cost.
+  Vector6 decidingPull(const Vector6& residual) const {
+    const Vector6 of_distance = pullOf(residual);
+    const Vector6 rounding = kExposed * residual.norm() * reach();
+    return (of_distance.array().abs() > rounding.array()).select(of_distance, pull);
+  }
+
+  // The largest pull that a wrench of unit size has on each component.
+  Vector6 reach() const {
+    Vector6 norms = Vector6::Zero();
+    norms.head(size) = e.leftCols(size).colwise().norm();
+    return norms;
   }
 };
 
@@ -210,8 +279,9 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
     at.head(n) = force;
     if (relaxed) {
       // Components of the residual that expose a face are more than it may be off.
-      const double rounding = std::max(kExposed, 10. * kMissing * scale / size) * direction.norm() *
-                              std::max(1., contact.lever.norm());
+      Vector6 rounding = Vector6::Zero();
+      rounding.head(n) = std::max(kExposed, 10. * kMissing * scale / size) * direction.norm() *
+                         NE.colwise().norm().transpose();
       distance_gap += std::max(0., face.support(own, rounding) - own.dot(at));
       ScaledSet exposed;
       if (!face.expose(own, rounding, exposed)) return false;
@@ -220,7 +290,8 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
     const double terms = (weights.cwiseAbs2().cwiseProduct(force)).lpNorm<Eigen::Infinity>() +
                          multipliers.norm() * std::max(1., contact.lever.norm()) +
                          (weights.cwiseAbs2().cwiseProduct(reference)).lpNorm<Eigen::Infinity>();
-    gap += std::max(0., face.support(against, tolerance * terms) - against.dot(at));
+    gap +=
+        std::max(0., face.support(against, Vector6::Constant(tolerance * terms)) - against.dot(at));
     all_costs += terms * force_size;
   }
   return distance_gap <= tolerance * (size * scale + size * size) && gap <= tolerance * all_costs &&
@@ -230,35 +301,48 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
 
 struct DistributionSolver::Workspace {
   int maximal_iterations = kMaximalIterations;
-  bool warm_start = true, has_answer = false;
+  bool warm_start = true;
   DistributionSolution solution;
   std::vector<Block> blocks;
   Vector6 weights;  // D over its overall size
-  Vector6 target;
-  double mean_compliance = 0., largest_weight = 0.;  // of the cost, of all contacts
+  Vector6 target, residual;
+  double largest_weight = 0.;  // of the cost, of all contacts
+  // What the last answer leaves to start from.
+  bool has_answer = false;
+  Vector6 slackened = Vector6::Zero();  // multipliers from which the last Relaxed answer was found
 
   // Of the multipliers at hand.
   Vector6 multipliers = Vector6::Zero(), achieved = Vector6::Zero();
   double terms = 0.;  // what the achieved wrench is a sum of
   double may_lack = kMissing;
   double value = 0.;  // of the dual, without slack
-  Matrix6 compliance;
   Factors6 factors;
-  int iterations = 0;
+  int iterations = 0, iterations_in_vain = 0;
+  bool is_accurate = false;
 
   using Which = ScaledSet Block::*;
 
   void take(const DistributionProblem& problem, double unit, double overall_weight);
   void evaluate(const Vector6& nu, Which which);
-  void assemble(double slack);
-  bool descend(Which which, double slack, const Vector6& centre, int steps);
+  void factorise(double slack, const Matrix6* outside);
+  bool descend(Which which, double slack, const Vector6& centre, int steps,
+               const Matrix6* outside = nullptr);
+  bool hasFullRank() const {
+    const Vector6& pivots = factors.pivots();
+    return (pivots.array() > kFullRank * pivots.maxCoeff()).all();
+  }
+  double findMeanCompliance() const;
   bool startFree();
   double enough() const { return std::max(may_lack, kRounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
+  bool relaxFrom(double slack);
   bool relax(const Vector6& guess);
   bool spanFaces(Matrix6& basis, int& rank, Vector6& fixed);
-  bool findResidual(Vector6& residual);
+  bool findResidual(Matrix6& outside);
+  bool reachClosest(const Matrix6& outside);
+  bool exposesClearly();
+  bool reachOnFaces(const Matrix6& outside);
   std::vector<Vector6> directions;
 };
 
@@ -273,14 +357,11 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
   for (const auto& contact : problem.contacts)
     largest_weight =
         std::max(largest_weight, contact.weights.size() > 0 ? contact.weights.maxCoeff() : 1.);
-  mean_compliance = 0.;
   for (std::size_t k = 0; k < blocks.size(); ++k) {
     const DistributionProblem::Contact& contact = problem.contacts[k];
     Block& block = blocks[k];
     const Index n = contact.set.size();
     block.size = int(n);
-    block.rotation = contact.rotation;
-    block.lever = contact.lever;
     Vector6 own = Vector6::Ones();
     if (contact.weights.size() > 0)
       own.head(n) = contact.weights / largest_weight;
@@ -293,13 +374,19 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
       block.set = block.face = ScaledSet(contact.set, own);
       block.is_described = true;
     }
+    block.place(contact, weights);
     block.set.setUnit(contact.set, own, unit);
+    block.has_reference = contact.reference.size() > 0;
     block.reference.setZero();
-    if (contact.reference.size() > 0)
+    if (block.has_reference)
       block.reference.head(n) = contact.reference.cwiseProduct(own.head(n)) / unit;
-    for (int i = 0; i < int(n); ++i)
-      mean_compliance += weights.cwiseProduct(block.wrenchOf(Vector6::Unit(i))).squaredNorm() / 6.;
   }
+}
+
+double DistributionSolver::Workspace::findMeanCompliance() const {
+  double sum = 0.;
+  for (const Block& block : blocks) sum += block.e.leftCols(block.size).squaredNorm() / 6.;
+  return sum;
 }
 
 // The forces for multipliers, and what they amount to.
@@ -307,12 +394,12 @@ void DistributionSolver::Workspace::evaluate(const Vector6& nu, Which which) {
   multipliers = nu;
   achieved.setZero();
   terms = value = 0.;
-  const Vector6 y = weights.cwiseProduct(nu);
   for (Block& block : blocks) {
-    block.pull = block.pullOf(y) + block.reference;
+    block.pull = block.pullOf(nu);
+    if (block.has_reference) block.pull += block.reference;
     (block.*which).project(block.pull, block.response);
     const Vector6& x = block.response.force;
-    const Vector6 wrench = weights.cwiseProduct(block.wrenchOf(x));
+    const Vector6 wrench = block.wrenchOf(x);
     achieved += wrench;
     terms += wrench.norm();
     value += block.pull.dot(x) - 0.5 * x.squaredNorm();
@@ -320,26 +407,20 @@ void DistributionSolver::Workspace::evaluate(const Vector6& nu, Which which) {
   value -= nu.dot(target);
 }
 
-// How the wrench rises with its multipliers, and its factors.
-void DistributionSolver::Workspace::assemble(double slack) {
-  compliance.setZero();
-  for (const Block& block : blocks) {
-    const ScaledSet::Response& response = block.response;
-    block.addCompliance(response.of_force, response.of_moment, compliance);
-    if (response.inverse_stiffness == 0.) continue;
-    const Vector6 growth = block.wrenchOf(response.growth);
-    compliance.noalias() += response.inverse_stiffness * growth * growth.transpose();
-  }
-  compliance = weights.asDiagonal() * compliance * weights.asDiagonal();
-  Matrix6 slackened = compliance;
-  slackened.diagonal().array() += slack;
-  factors.compute(slackened);
+// How the wrench rises with its multipliers, with slack.
+// @param outside  what to add to that, where faces give no wrenches; or null
+void DistributionSolver::Workspace::factorise(double slack, const Matrix6* outside) {
+  Matrix6 compliance = Matrix6::Zero();
+  for (const Block& block : blocks) block.addCompliance(compliance);
+  if (outside) compliance += *outside;
+  compliance.diagonal().array() += slack;
+  factors.compute(compliance);
 }
 
 // Newton's method for the minimum of the dual and ½ slack ‖ν − centre‖², from the multipliers at
 // hand. Returns whether it is there; without slack also false where some wrenches are hardly given.
 bool DistributionSolver::Workspace::descend(Which which, double slack, const Vector6& centre,
-                                            int steps) {
+                                            int steps, const Matrix6* outside) {
   double former = std::numeric_limits<double>::infinity();
   for (int step = 0; iterations < maximal_iterations; ++step) {
     const Vector6 gradient = slack * (multipliers - centre) - missing();
@@ -349,9 +430,8 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
     former = size;
     if (step == steps) return false;
     ++iterations;
-    assemble(slack);
-    const Vector6& pivots = factors.pivots();
-    if (slack == 0. && !(pivots.array() > kFullRank * pivots.maxCoeff()).all()) return false;
+    factorise(slack, outside);
+    if (slack == 0. && !hasFullRank()) return false;
     const Vector6 direction = -factors.solve(gradient);
     const double slope = gradient.dot(direction);
     if (!(slope < 0.)) return false;
@@ -391,55 +471,76 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
 
 // The multipliers that are the answer if all forces are inside of their sets.
 bool DistributionSolver::Workspace::startFree() {
-  Matrix6 sum = Matrix6::Zero();
+  ++iterations;
+  Matrix6 compliance = Matrix6::Zero();
   Vector6 rest = target;
   for (const Block& block : blocks) {
-    block.addCompliance(Matrix3d::Identity(), Matrix3d::Identity(), sum);
-    rest -= weights.cwiseProduct(block.wrenchOf(block.reference));
+    block.addFreeCompliance(compliance);
+    if (block.has_reference) rest -= block.wrenchOf(block.reference);
   }
-  sum = weights.asDiagonal() * sum * weights.asDiagonal();
-  factors.compute(sum);
-  const Vector6& pivots = factors.pivots();
-  const bool has_full_rank = (pivots.array() > kFullRank * pivots.maxCoeff()).all();
+  factors.compute(compliance);
+  const bool has_full_rank = hasFullRank();
   evaluate(has_full_rank ? factors.solve(rest) : Vector6(Vector6::Zero()), &Block::set);
   return has_full_rank;
 }
 
 DistributionStatus DistributionSolver::Workspace::search() {
-  iterations = 0;
+  residual.setZero();
   const Which all = &Block::set;
+  double slack = kFirstSlack * findMeanCompliance();
   if (warm_start && has_answer) {
-    evaluate(multipliers, all);
+    const bool was_reached = solution.status == DistributionStatus::Solved;
+    evaluate(was_reached ? multipliers : slackened, all);
     if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
-    if (descend(all, 0., multipliers, 2)) return DistributionStatus::Solved;
+    if (was_reached && descend(all, 0., multipliers, kWarmSteps)) return DistributionStatus::Solved;
+    if (!was_reached && relaxFrom(slack)) return DistributionStatus::Relaxed;
+    iterations_in_vain = std::exchange(iterations, 0);
   }
   if (startFree() && descend(all, 0., multipliers, kFreeSteps)) return DistributionStatus::Solved;
   if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
 
+  is_accurate = false;
   // The proximal point method on the dual, which is the method of multipliers (Rockafellar 1976).
-  double slack = kFirstSlack * mean_compliance, former = std::numeric_limits<double>::infinity();
+  const double least_slack = kLeastSlack / kFirstSlack * slack;
+  double former = std::numeric_limits<double>::infinity();
   Vector6 centre = Vector6::Zero(), former_missing = Vector6::Zero();
-  evaluate(centre, all);
   for (int round = 0; round < kMaximalRounds && iterations < maximal_iterations; ++round) {
-    descend(all, slack, centre, kMaximalSteps);
+    if (round == 0) {
+      if (relaxFrom(slack)) return DistributionStatus::Relaxed;
+    } else {
+      descend(all, slack, centre, kMaximalSteps);
+    }
     const Vector6 lacking = missing();
     const double size = lacking.norm();
     if (size <= enough()) return DistributionStatus::Solved;
     // What stays is out of reach, if it proves so.
     const bool stays = (lacking - former_missing).norm() <= 0.1 * size;
-    if (size > kReach && (round == 0 || stays)) {
+    if (round > 0 && size > kReach && stays) {
       const Vector6 kept = multipliers;
       if (relax(lacking)) return DistributionStatus::Relaxed;
       evaluate(kept, all);
     }
     former_missing = lacking;
-    if (size > kFall * former)
-      slack = std::max(slack * kSlackFactor, kLeastSlack * mean_compliance);
+    if (size > kFall * former) slack = std::max(slack * kSlackFactor, least_slack);
     former = size;
     centre = multipliers;
   }
   return missing().norm() <= kReach ? DistributionStatus::Solved
                                     : DistributionStatus::NumericalFailure;
+}
+
+// Out of reach, from the multipliers at hand: the minimum with slack knows the faces.
+bool DistributionSolver::Workspace::relaxFrom(double slack) {
+  descend(&Block::set, slack, Vector6::Zero(), kMaximalSteps);
+  const Vector6 lacking = missing();
+  if (!(lacking.norm() > kReach)) return false;
+  const Vector6 kept = multipliers;
+  if (relax(lacking)) {
+    slackened = kept;
+    return true;
+  }
+  evaluate(kept, &Block::set);
+  return false;
 }
 
 // An orthonormal basis of the wrenches that the faces span, and the wrench that all forces in them
@@ -449,9 +550,9 @@ bool DistributionSolver::Workspace::spanFaces(Matrix6& basis, int& rank, Vector6
   fixed.setZero();
   for (const Block& block : blocks) {
     const ScaledSet::Span span = block.face.span();
-    fixed += weights.cwiseProduct(block.wrenchOf(span.fixed));
+    fixed += block.wrenchOf(span.fixed);
     for (int k = 0; k < span.count; ++k)
-      directions.push_back(weights.cwiseProduct(block.wrenchOf(span.axes.col(k))).normalized());
+      directions.push_back(block.wrenchOf(span.axes.col(k)).normalized());
   }
   return internal::findSpan(directions, kIndependent, kDependent, basis, rank);
 }
@@ -460,37 +561,38 @@ bool DistributionSolver::Workspace::spanFaces(Matrix6& basis, int& rank, Vector6
 // target that the faces which forces are on do not span. Where these turn with the residual, by
 // Newton's method, whose Jacobian outside of what they span is 1 + Σ ∂(NE x)/∂r. Then the faces are
 // those that it exposes.
-bool DistributionSolver::Workspace::findResidual(Vector6& residual) {
+//
+// @param outside  the projector on what they do not span
+bool DistributionSolver::Workspace::findResidual(Matrix6& outside) {
   bool is_found = false;
   for (int step = 0; step < kResidualSteps && !is_found; ++step) {
-    const Vector6 y = weights.cwiseProduct(residual);
     Matrix6 bend = Matrix6::Zero();
+    bool is_bent = false;
     for (Block& block : blocks) {
-      Matrix3d of_force, of_moment;
-      block.set.hold(block.response, block.pullOf(y), block.face, of_force, of_moment);
-      if (of_force.isZero(0.) && of_moment.isZero(0.)) continue;
-      block.addCompliance(of_force, of_moment, bend);
+      ScaledSet::Bend own;
+      block.set.hold(block.response, block.pullOf(residual), block.face, own);
+      if (own.friction.isZero(0.) && own.moments.isZero(0.)) continue;
+      is_bent = true;
+      block.addCompliance(own.friction, own.moments, 0., bend);
     }
     Matrix6 basis;
     int rank = 0;
     Vector6 fixed;
     if (!spanFaces(basis, rank, fixed) || rank == 6) return false;
-    const auto spanned = basis.leftCols(rank);
+    outside.noalias() = Matrix6::Identity() - basis * basis.transpose();
     const Vector6 rest = target - fixed;
-    const Vector6 former = residual;
-    if (bend.isZero(0.)) {
-      residual = rest - spanned * (spanned.transpose() * rest);
-      residual -= spanned * (spanned.transpose() * residual);
+    if (!is_bent) {
+      residual.noalias() = outside * Vector6(outside * rest);
       is_found = true;
       continue;
     }
-    const Matrix6 jacobian =
-        Matrix6::Identity() + weights.asDiagonal() * bend * weights.asDiagonal();
-    const Eigen::PartialPivLU<Matrix6> lu(jacobian);
+    const Vector6 former = residual;
+    const Eigen::PartialPivLU<Matrix6> lu(Matrix6::Identity() + bend);
     residual += lu.solve(rest - residual);  // but for what faces make up for
     if (rank > 0) {
       using Spanned = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
       using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+      const auto spanned = basis.leftCols(rank);
       const Spanned bent = lu.solve(spanned);
       const Eigen::LDLT<Square> along(Square(spanned.transpose() * bent));
       residual -= bent * along.solve(spanned.transpose() * residual);
@@ -499,54 +601,90 @@ bool DistributionSolver::Workspace::findResidual(Vector6& residual) {
   }
   const double size = residual.norm();
   if (!is_found || !(size > kReach) || !std::isfinite(size)) return false;
-  const Vector6 y = weights.cwiseProduct(residual);
-  for (Block& block : blocks) {
-    const double reach = block.inverse_weights.maxCoeff() * std::max(1., block.lever.norm());
-    const double tolerance = (kExposed * size + kRounding) * reach;
-    if (!block.set.expose(block.pullOf(y), tolerance, block.face)) return false;
-  }
+  for (Block& block : blocks)
+    if (!block.set.expose(block.pullOf(residual), (kExposed * size + kRounding) * block.reach(),
+                          block.face))
+      return false;
   return true;
+}
+
+// The cheapest forces on the faces that give the target, from the multipliers at hand.
+bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside) {
+  const Which face = &Block::face;
+  // What is missing of the target is to be accurate: nothing but rounding may be off.
+  may_lack = 0.;
+  const double compliance = findMeanCompliance();
+  const Vector6 start = multipliers;
+  const Matrix6 stiff = compliance * outside;
+  evaluate(start, face);
+  bool given = descend(face, 0., start, kFreeSteps, &stiff);
+  if (!given) {
+    Vector6 centre = start;
+    evaluate(start, face);
+    double slack = kFaceSlack * compliance, former = missing().norm();
+    for (int slow = 0; slow < kSlowRounds && iterations < maximal_iterations;) {
+      descend(face, slack, centre, kMaximalSteps);
+      const double size = missing().norm();
+      if (size <= enough() || (size <= kMissing && size > 0.5 * former)) break;
+      if (size > kFall * former) {
+        ++slow;
+        slack = std::max(slack * kSlackFactor, kLeastSlack * compliance);
+      }
+      former = size;
+      centre = multipliers;
+    }
+    // Multipliers of what faces do not give mean nothing.
+    evaluate(multipliers - outside * multipliers, face);
+    given = missing().norm() <= std::max(kMissing, enough());
+  }
+  may_lack = kMissing;
+  return given;
 }
 
 // Out of reach: the closest wrench, then the cheapest forces of those on the faces that its
 // residual exposes, and the proof of both.
 bool DistributionSolver::Workspace::relax(const Vector6& guess) {
-  Vector6 residual = guess;
-  if (!findResidual(residual)) return false;
+  Matrix6 outside;
+  residual = guess;
+  const bool is_found = findResidual(outside);
+  if (!is_found || !reachClosest(outside)) {
+    residual.setZero();
+    return false;
+  }
+  return true;
+}
+
+// The cheapest forces that leave the residual, and the proof of both.
+bool DistributionSolver::Workspace::reachClosest(const Matrix6& outside) {
+  const double size = residual.norm();
   const Vector6 asked = target;
   target -= residual;
-  const Vector6 start = multipliers - multipliers.dot(residual) / residual.squaredNorm() * residual;
-  evaluate(start, &Block::face);
-  // What is missing is to be accurate: nothing but rounding may be off.
-  may_lack = 0.;
-  Vector6 centre = start;
-  double slack = kFaceSlack * mean_compliance, former = missing().norm();
-  for (int slow = 0; slow < kSlowRounds && iterations < maximal_iterations;) {
-    descend(&Block::face, slack, centre, kMaximalSteps);
-    const double size = missing().norm();
-    if (size <= enough() || (size <= kMissing && size > 0.5 * former)) break;
-    if (size > kFall * former) {
-      ++slow;
-      slack = std::max(slack * kSlackFactor, kLeastSlack * mean_compliance);
-    }
-    former = size;
-    centre = multipliers;
-  }
-  const bool given = missing().norm() <= std::max(kMissing, enough());
-  may_lack = kMissing;
+  multipliers -= Vector6(outside * multipliers);
+  const bool given = reachOnFaces(outside);
   target = asked;
   if (!given) return false;
   // No reachable wrench is closer: forces are as far in the direction of the residual as any.
-  const double size = residual.norm();
-  const Vector6 y = weights.cwiseProduct(residual);
   double gap = 0.;
   for (const Block& block : blocks) {
-    const Vector6 pull = block.pullOf(y);
-    const double reach = block.inverse_weights.maxCoeff() * std::max(1., block.lever.norm());
-    gap += std::max(
-        0., block.set.support(pull, kExposed * size * reach) - pull.dot(block.response.force));
+    const Vector6 pull = block.pullOf(residual);
+    gap += std::max(0., block.set.support(pull, kExposed * size * block.reach()) -
+                            pull.dot(block.response.force));
   }
+  is_accurate = size >= kFar * weights.maxCoeff() / weights.minCoeff() && exposesClearly();
   return gap <= kReach * size;
+}
+
+// Whether the residual exposes the same faces, whatever of it is taken for rounding.
+bool DistributionSolver::Workspace::exposesClearly() {
+  const double size = residual.norm();
+  const auto countAxes = [&](const Block& block, double tolerance) {
+    ScaledSet face;
+    block.set.expose(block.pullOf(residual), tolerance * size * block.reach(), face);
+    return face.span().count;
+  };
+  return std::all_of(blocks.begin(), blocks.end(), [&](const Block& block) {
+    return countAxes(block, kSurelyNone) == countAxes(block, kSurelyExposed);
+  });
 }
 
 DistributionSolver::DistributionSolver() : work_(std::make_unique<Workspace>()) {}
@@ -569,19 +707,23 @@ void DistributionSolver::setWarmStart(bool warm_start) { work_->warm_start = war
 
 void DistributionSolver::forget() { work_->has_answer = false; }
 
+const DistributionSolution& DistributionSolver::solution() const { return work_->solution; }
+
 const DistributionSolution& DistributionSolver::solve(const DistributionProblem& problem) {
   Workspace& work = *work_;
   DistributionSolution& solution = work.solution;
   const std::size_t contacts = problem.contacts.size();
   work.has_answer = work.has_answer && solution.forces.size() == contacts;
   solution.forces.resize(contacts);
+  solution.bounds.resize(contacts);
   const Vector6& D = problem.wrench_weights;
   const double scale = problem.scale();
   const double wrench_size = normOf(problem.wrench);
   const double overall_weight =
       wrench_size > 0. ? normOf(D.cwiseProduct(problem.wrench)) / wrench_size : D.maxCoeff();
   const double unit = scale / overall_weight;
-  work.iterations = 0;
+  work.iterations = work.iterations_in_vain = 0;
+  work.is_accurate = true;
   if (!problem.wrench.allFinite()) {
     solution.status = DistributionStatus::InvalidInput;
   } else if (contacts == 0) {
@@ -594,10 +736,13 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
     work.take(problem, unit, overall_weight);
     solution.status = work.search();
   }
-  solution.iterations = work.iterations;
-  work.has_answer = contacts > 0 && scale > 0. && solution.status == DistributionStatus::Solved;
-  const bool answered =
-      work.has_answer || (contacts > 0 && solution.status == DistributionStatus::Relaxed);
+  solution.iterations_in_vain = work.iterations_in_vain;
+  solution.iterations = work.iterations + work.iterations_in_vain;
+  solution.is_accurate = work.is_accurate;
+  const bool answered = contacts > 0 && scale > 0. &&
+                        (solution.status == DistributionStatus::Solved ||
+                         solution.status == DistributionStatus::Relaxed);
+  work.has_answer = answered;
   solution.achieved.setZero();
   solution.multipliers.setZero();
   solution.cost = 0.;
@@ -607,14 +752,19 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   for (std::size_t k = 0; k < contacts; ++k) {
     Eigen::VectorXd& force = solution.forces[k];
     force.setZero(problem.contacts[k].set.size());
+    solution.bounds[k].setZero();
     if (!answered) continue;
     const Block& block = work.blocks[k];
-    const Vector6 x = block.response.force;
+    const Vector6& x = block.response.force;
+    solution.bounds[k] = block.set.findBounds(block.response, block.decidingPull(work.residual));
     force = unit * x.cwiseProduct(block.inverse_weights).head(force.size());
     solution.cost += 0.5 * (x - block.reference).squaredNorm() * std::pow(unit * largest, 2);
-    solution.achieved += unit * block.wrenchOf(x);
+    solution.achieved += unit * block.wrenchOf(x).cwiseQuotient(work.weights);
   }
-  solution.residual = problem.wrench - solution.achieved;
+  // That of the closest wrench is known with more digits than the difference has.
+  solution.residual = solution.status == DistributionStatus::Relaxed
+                          ? Vector6(unit * work.residual.cwiseQuotient(work.weights))
+                          : Vector6(problem.wrench - solution.achieved);
   return solution;
 }
 

@@ -20,11 +20,6 @@ constexpr double kHeldByCost = 0.05;
 // What is rounding of a sum, over its terms.
 constexpr double kRounding = 4. * std::numeric_limits<double>::epsilon();
 
-// The normal of an edge, of length 1.
-Vector2d findOutward(const Vector2d& first, const Vector2d& last) {
-  return Vector2d(last.y() - first.y(), first.x() - last.x()).normalized();
-}
-
 // A number limited to an interval that is z times as large, and what that means.
 struct Limited {
   double value, by_value, by_normal, push;
@@ -34,6 +29,13 @@ Limited limit(double value, double normal, double lower, double upper) {
   if (value > high || lower == upper) return {high, 0., upper, (value - high) * upper};
   if (value < low) return {low, 0., lower, (value - low) * lower};
   return {value, 1., 0., 0.};
+}
+
+// The end of an interval that a value is at, −1 or 1; by a pull where it is a point.
+signed char findSide(double value, double lower, double upper, double pull) {
+  const double above = value - lower, below = upper - value;
+  if (above == below) return pull < 0. ? -1 : 1;
+  return above < below ? -1 : 1;
 }
 
 }  // namespace
@@ -51,28 +53,46 @@ ScaledSection::ScaledSection(const Section& section, const Vector2d& scale)
       const Eigen::Matrix2Xd vertices = scale.asDiagonal() * section.vertices();
       const Index count = vertices.cols();
       if (count == 2) {
-        *this = segment(vertices.col(0), vertices.col(1));
+        *this = ScaledSection(Edge(vertices.col(0), vertices.col(1)));
         break;
       }
       shape_ = Shape::Polygon;
-      const auto polygon = std::make_shared<Polygon>();
-      polygon->normals.resize(2, count);
+      const auto edges = std::make_shared<std::vector<Edge>>();
       for (Index k = 0; k < count; ++k)
-        polygon->normals.col(k) = findOutward(vertices.col(k), vertices.col((k + 1) % count));
-      polygon->offsets = polygon->normals.cwiseProduct(vertices).colwise().sum();
-      polygon->vertices = vertices;
-      polygon_ = polygon;
+        edges->emplace_back(vertices.col(k), vertices.col((k + 1) % count));
+      polygon_ = edges;
       break;
     }
   }
 }
 
-ScaledSection ScaledSection::segment(const Vector2d& first, const Vector2d& last) {
-  ScaledSection segment;
-  segment.shape_ = Shape::Segment;
-  segment.lower_ = first;
-  segment.upper_ = last;
-  return segment;
+ScaledSection::Edge::Edge(const Vector2d& first_vertex, const Vector2d& last_vertex)
+    : first(first_vertex),
+      last(last_vertex),
+      outward(Vector2d(last.y() - first.y(), first.x() - last.x()).normalized()),
+      offset(outward.dot(first)),
+      begin(along().dot(first)),
+      end(along().dot(last)) {}
+
+ScaledSection::ScaledSection(const Edge& edge) : shape_(Shape::Segment), edge_(edge) {}
+
+bool ScaledSection::contains(const Vector2d& point, double normal) const {
+  switch (shape_) {
+    case Shape::Box:
+      return (point.array() > normal * lower_.array()).all() &&
+             (point.array() < normal * upper_.array()).all();
+    case Shape::Disc:
+      return normal > 0. && point.squaredNorm() < std::pow(radii_.x() * normal, 2);
+    case Shape::Ellipse:
+      return normal > 0. && point.cwiseQuotient(radii_).squaredNorm() < normal * normal;
+    case Shape::Segment:
+      return false;
+    case Shape::Polygon:
+      break;
+  }
+  return std::all_of(polygon_->begin(), polygon_->end(), [&](const Edge& edge) {
+    return edge.outward.dot(point) < normal * edge.offset;
+  });
 }
 
 void ScaledSection::project(const Vector2d& point, double normal, Response& response) const {
@@ -110,13 +130,39 @@ void ScaledSection::project(const Vector2d& point, double normal, Response& resp
       projectOnEllipse(point, normal, response);
       return;
     case Shape::Segment:
-      projectOnSegment(point, normal, response);
+      edge_.project(point, normal, response);
       return;
     case Shape::Polygon:
-      projectOnPolygon(point, normal, response);
-      return;
+      if (const Edge* edge = findEdge(point, normal)) {
+        edge->project(point, normal, response);
+        return;
+      }
+      break;
   }
   response = {point, Matrix2d::Identity(), Vector2d::Zero(), 0., 0.};
+}
+
+void ScaledSection::addPush(const Vector2d& point, double normal, double& push,
+                            double& stiffening) const {
+  if (normal > 0. && shape_ == Shape::Box) {
+    for (int k = 0; k < 2; ++k) {
+      const Limited limited = limit(point[k], normal, lower_[k], upper_[k]);
+      push += limited.push;
+      stiffening += limited.by_normal * limited.by_normal;
+    }
+    return;
+  }
+  if (normal > 0. && shape_ == Shape::Disc) {
+    const double radius = radii_.x(), beyond = point.norm() - radius * normal;
+    if (beyond <= 0.) return;
+    push += radius * beyond;
+    stiffening += radius * radius;
+    return;
+  }
+  Response response;
+  project(point, normal, response);
+  push += response.push;
+  stiffening += response.stiffening;
 }
 
 // The points p = A (A + t)⁻¹ g, A the squares of the radii, with pᵀ A⁻¹ p = z²: t > 0 is the root
@@ -146,39 +192,34 @@ void ScaledSection::projectOnEllipse(const Vector2d& point, double normal,
   response.stiffening = (response.by_normal.dot(point) - response.push) / normal;
 }
 
-void ScaledSection::projectOnSegment(const Vector2d& point, double normal,
-                                     Response& response) const {
-  const Vector2d outward = findOutward(lower_, upper_), along(-outward.y(), outward.x());
-  const double place = along.dot(point);
-  const bool is_before = place <= normal * along.dot(lower_);
-  if (is_before || place >= normal * along.dot(upper_)) {
-    const Vector2d& end = is_before ? lower_ : upper_;
-    response = {normal * end, Matrix2d::Zero(), end, (point - normal * end).dot(end),
-                end.squaredNorm()};
+void ScaledSection::Edge::project(const Vector2d& point, double normal, Response& response) const {
+  const double place = along().dot(point);
+  const bool is_before = place <= normal * begin;
+  if (is_before || place >= normal * end) {
+    const Vector2d& vertex = is_before ? first : last;
+    response = {normal * vertex, Matrix2d::Zero(), vertex, (point - normal * vertex).dot(vertex),
+                vertex.squaredNorm()};
     return;
   }
-  const double offset = outward.dot(lower_);
-  response = {place * along + normal * offset * outward, along * along.transpose(),
+  response = {place * along() + normal * offset * outward, along() * along().transpose(),
               offset * outward, (outward.dot(point) - normal * offset) * offset, offset * offset};
 }
 
-// On the nearest of the edges beyond which the point is.
-void ScaledSection::projectOnPolygon(const Vector2d& point, double normal,
-                                     Response& response) const {
-  const Polygon& polygon = *polygon_;
-  const Index count = polygon.vertices.cols();
-  double nearest = std::numeric_limits<double>::infinity();
-  Response on_edge;
-  response = {point, Matrix2d::Identity(), Vector2d::Zero(), 0., 0.};
-  for (Index k = 0; k < count; ++k) {
-    if (polygon.normals.col(k).dot(point) <= normal * polygon.offsets[k]) continue;
-    segment(polygon.vertices.col(k), polygon.vertices.col((k + 1) % count))
-        .projectOnSegment(point, normal, on_edge);
-    const double distance = (point - on_edge.point).squaredNorm();
-    if (distance >= nearest) continue;
-    nearest = distance;
-    response = on_edge;
+// The nearest of the edges that a point is beyond, or null.
+const ScaledSection::Edge* ScaledSection::findEdge(const Vector2d& point, double normal) const {
+  const Edge* nearest = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Edge& edge : *polygon_) {
+    const double beyond = edge.outward.dot(point) - normal * edge.offset;
+    if (beyond <= 0.) continue;
+    const double place = edge.along().dot(point);
+    const double aside = std::max({normal * edge.begin - place, place - normal * edge.end, 0.});
+    const double distance = beyond * beyond + aside * aside;
+    if (distance >= least) continue;
+    least = distance;
+    nearest = &edge;
   }
+  return nearest;
 }
 
 // A point that is as far as any in a direction.
@@ -193,41 +234,52 @@ Vector2d ScaledSection::findExposed(const Vector2d& direction) const {
       return size > 0. ? Vector2d(radii_.cwiseProduct(stretched) / size) : Vector2d::Zero();
     }
     case Shape::Segment:
-      return direction.dot(upper_ - lower_) > 0. ? upper_ : lower_;
+      return direction.dot(edge_.last - edge_.first) > 0. ? edge_.last : edge_.first;
     case Shape::Polygon:
       break;
   }
-  const Eigen::Matrix2Xd& vertices = polygon_->vertices;
-  Index farthest = 0;
-  for (Index k = 1; k < vertices.cols(); ++k)
-    if (direction.dot(vertices.col(k) - vertices.col(farthest)) > 0.) farthest = k;
-  return vertices.col(farthest);
+  const Edge* farthest = &polygon_->front();
+  for (const Edge& edge : *polygon_)
+    if (direction.dot(edge.first - farthest->first) > 0.) farthest = &edge;
+  return farthest->first;
 }
 
 double ScaledSection::support(const Vector2d& direction) const {
   return direction.dot(findExposed(direction));
 }
 
-ScaledSection ScaledSection::expose(const Vector2d& direction, double tolerance) const {
+Vector2d ScaledSection::findExtent() const {
+  switch (shape_) {
+    case Shape::Box:
+      return lower_.cwiseAbs().cwiseMax(upper_.cwiseAbs());
+    case Shape::Disc:
+    case Shape::Ellipse:
+      return radii_;
+    case Shape::Segment:
+      return edge_.first.cwiseAbs().cwiseMax(edge_.last.cwiseAbs());
+    case Shape::Polygon:
+      break;
+  }
+  Vector2d extent = Vector2d::Zero();
+  for (const Edge& edge : *polygon_) extent = extent.cwiseMax(edge.first.cwiseAbs());
+  return extent;
+}
+
+ScaledSection ScaledSection::expose(const Vector2d& direction, const Vector2d& rounding) const {
   ScaledSection face;
   if (shape_ == Shape::Box) {
-    face.lower_ = (direction.array() > tolerance).select(upper_, lower_);
-    face.upper_ = (direction.array() < -tolerance).select(lower_, upper_);
+    face.lower_ = (direction.array() > rounding.array()).select(upper_, lower_);
+    face.upper_ = (direction.array() < -rounding.array()).select(lower_, upper_);
     return face;
   }
-  if (direction.norm() <= tolerance) return *this;
-  const auto areAsFar = [&](const Vector2d& first, const Vector2d& last) {
-    return std::abs(direction.dot(last - first)) <= tolerance * (last - first).norm();
+  if (direction.norm() <= rounding.norm()) return *this;
+  const auto isAcross = [&](const Edge& edge) {
+    return std::abs(direction.dot(edge.along())) <= rounding.dot(edge.along().cwiseAbs());
   };
-  if (shape_ == Shape::Segment && areAsFar(lower_, upper_)) return *this;
-  if (shape_ == Shape::Polygon) {
-    const Eigen::Matrix2Xd& vertices = polygon_->vertices;
-    for (Index k = 0; k < vertices.cols(); ++k) {
-      const Vector2d first = vertices.col(k), last = vertices.col((k + 1) % vertices.cols());
-      if (areAsFar(first, last) && direction.dot(polygon_->normals.col(k)) > 0.)
-        return segment(first, last);
-    }
-  }
+  if (shape_ == Shape::Segment && isAcross(edge_)) return *this;
+  if (shape_ == Shape::Polygon)
+    for (const Edge& edge : *polygon_)
+      if (isAcross(edge) && direction.dot(edge.outward) > 0.) return ScaledSection(edge);
   face.lower_ = face.upper_ = findExposed(direction);
   return face;
 }
@@ -247,14 +299,12 @@ ScaledSection ScaledSection::hold(const Vector2d& point, const Matrix2d& by_poin
     face.lower_ = face.upper_ = point / normal;
     if (by_point.isZero(0.)) return face;
     if (shape_ == Shape::Segment) return *this;
-    const auto findOff = [&](Index k) {
-      return std::abs(polygon_->normals.col(k).dot(point) - normal * polygon_->offsets[k]);
+    const auto findOff = [&](const Edge& edge) {
+      return std::abs(edge.outward.dot(point) - normal * edge.offset);
     };
-    Index nearest = 0;
-    for (Index k = 1; k < polygon_->offsets.size(); ++k)
-      if (findOff(k) < findOff(nearest)) nearest = k;
-    const Eigen::Matrix2Xd& vertices = polygon_->vertices;
-    return segment(vertices.col(nearest), vertices.col((nearest + 1) % vertices.cols()));
+    return ScaledSection(
+        *std::min_element(polygon_->begin(), polygon_->end(),
+                          [&](const Edge& a, const Edge& b) { return findOff(a) < findOff(b); }));
   }
   // Held by what it costs, and not by the direction, which is far beyond.
   if (by_point.trace() > kHeldByCost) return *this;
@@ -275,12 +325,10 @@ ScaledSection::Span ScaledSection::span() const {
       if (lower_.x() < upper_.x()) add(Vector2d::UnitX());
       if (lower_.y() < upper_.y()) add(Vector2d::UnitY());
       break;
-    case Shape::Segment: {
-      const Vector2d outward = findOutward(lower_, upper_);
-      span.offset = outward.dot(lower_) * outward;
-      add(Vector2d(-outward.y(), outward.x()));
+    case Shape::Segment:
+      span.offset = edge_.offset * edge_.outward;
+      add(edge_.along());
       break;
-    }
     case Shape::Polygon:
     case Shape::Disc:
     case Shape::Ellipse:
@@ -289,6 +337,18 @@ ScaledSection::Span ScaledSection::span() const {
       break;
   }
   return span;
+}
+
+Eigen::Matrix<signed char, 2, 1> ScaledSection::findBounds(const Vector2d& point,
+                                                           const Matrix2d& by_point, double normal,
+                                                           const Vector2d& pull) const {
+  Eigen::Matrix<signed char, 2, 1> bounds = Eigen::Matrix<signed char, 2, 1>::Zero();
+  for (int k = 0; k < 2; ++k)
+    if (shape_ != Shape::Box)
+      bounds[k] = by_point.isIdentity(0.) ? 0 : 1;
+    else if (by_point(k, k) == 0.)
+      bounds[k] = findSide(point[k], normal * lower_[k], normal * upper_[k], pull[k]);
+  return bounds;
 }
 
 ScaledSet::ScaledSet(const ContactSet& set, const Vector6& weights)
@@ -305,36 +365,42 @@ void ScaledSet::setUnit(const ContactSet& set, const Vector6& weights, double un
   upper_.head(size_) = set.upper().cwiseProduct(weights).head(size_) / unit;
 }
 
-void ScaledSet::projectAt(const Vector6& point, double normal, Parts& parts) const {
-  friction_.project(point.head<2>(), normal, parts.friction);
-  parts.push = parts.friction.push;
-  parts.stiffness = 1. + parts.friction.stiffening;
+bool ScaledSet::isInside(const Vector6& point) const {
+  const double normal = point[kNormal];
+  return normal > lower_[kNormal] && normal < upper_[kNormal] &&
+         friction_.contains(point.head<2>(), normal) &&
+         (size_ == 3 || (moments_.contains(point.segment<2>(3), normal) &&
+                         point[kYaw] > normal * yaw_[0] && point[kYaw] < normal * yaw_[1]));
+}
+
+void ScaledSet::addPush(const Vector6& point, double normal, double& push,
+                        double& stiffness) const {
+  friction_.addPush(point.head<2>(), normal, push, stiffness);
   if (size_ == 3) return;
-  moments_.project(point.segment<2>(3), normal, parts.moments);
+  moments_.addPush(point.segment<2>(3), normal, push, stiffness);
   const Limited yaw = limit(point[kYaw], normal, yaw_[0], yaw_[1]);
-  parts.yaw = yaw.value;
-  parts.yaw_growth = yaw.by_normal;
-  parts.push += parts.moments.push + yaw.push;
-  parts.stiffness += parts.moments.stiffening + yaw.by_normal * yaw.by_normal;
+  push += yaw.push;
+  stiffness += yaw.by_normal * yaw.by_normal;
 }
 
 // The root of z − g_z − Σ push(z), which rises; Newton's method within a bracket, from where all
 // are inside, or from zero. Returns whether it lies between the bounds of the normal force, and not
 // at one of them.
-bool ScaledSet::findNormal(const Vector6& point, double& normal, Parts& parts) const {
+bool ScaledSet::findNormal(const Vector6& point, double& normal) const {
   const double pull = point[kNormal];
   double lower = lower_[kNormal], upper = upper_[kNormal];
   bool is_lower_known = false, is_upper_known = false;
   normal = std::clamp(pull, lower, upper);
   for (int step = 0; step < kNormalSteps; ++step) {
-    projectAt(point, normal, parts);
-    const double off = normal - pull - parts.push;
-    if (std::abs(off) <= kRounding * (normal + std::abs(pull) + std::abs(parts.push))) break;
+    double push = 0., stiffness = 1.;
+    addPush(point, normal, push, stiffness);
+    const double off = normal - pull - push;
+    if (std::abs(off) <= kRounding * (normal + std::abs(pull) + std::abs(push))) break;
     (off > 0. ? upper : lower) = normal;
     (off > 0. ? is_upper_known : is_lower_known) = true;
     if (!(lower < upper)) break;
     // A step beyond the bracket ends at a bound that has not been looked at, or in the middle.
-    double next = normal - off / parts.stiffness;
+    double next = normal - off / stiffness;
     if (next == normal) break;
     if (next <= lower)
       next = is_lower_known ? 0.5 * (lower + upper) : lower;
@@ -346,37 +412,50 @@ bool ScaledSet::findNormal(const Vector6& point, double& normal, Parts& parts) c
 }
 
 void ScaledSet::project(const Vector6& point, Response& response) const {
-  response = Response();
   if (is_grasp_) {
+    const auto isBetween = [&](int k) { return point[k] > lower_[k] && point[k] < upper_[k]; };
+    const auto isFree = [&](int k) { return isBetween(k) ? 1. : 0.; };
     response.force = point.cwiseMax(lower_).cwiseMin(upper_);
-    for (int k = 0; k < 6; ++k) {
-      const double is_free = point[k] > lower_[k] && point[k] < upper_[k] ? 1. : 0.;
-      (k < 3 ? response.of_force(k, k) : response.of_moment(k - 3, k - 3)) = is_free;
-    }
+    response.is_free = false;
+    response.of_friction << isFree(0), 0., 0., isFree(1);
+    response.of_moments << isFree(3), 0., 0., isFree(4);
+    response.of_yaw = isFree(kYaw);
+    response.growth = Vector6::Unit(kNormal);
+    response.inverse_stiffness = isFree(kNormal);
+    return;
+  }
+  response.is_free = isInside(point);
+  if (response.is_free) {
+    response.force = point;
     return;
   }
   double normal = 0.;
-  Parts parts;
-  const bool is_free = findNormal(point, normal, parts);
-  if (normal <= 0.) return;
-  response.force.head<2>() = parts.friction.point;
-  response.force[kNormal] = normal;
-  response.of_force.topLeftCorner<2, 2>() = parts.friction.by_point;
-  if (size_ == 6) {
-    response.force.segment<2>(3) = parts.moments.point;
-    response.force[kYaw] = parts.yaw;
-    response.of_moment.topLeftCorner<2, 2>() = parts.moments.by_point;
-    response.of_moment(2, 2) =
-        point[kYaw] > normal * yaw_[0] && point[kYaw] < normal * yaw_[1] ? 1. : 0.;
+  const bool is_normal_free = findNormal(point, normal);
+  if (normal <= 0.) {
+    response = Response();
+    return;
   }
-  if (!is_free) return;
-  response.growth.head<2>() = parts.friction.by_normal;
+  ScaledSection::Response part;
+  friction_.project(point.head<2>(), normal, part);
+  double stiffness = 1. + part.stiffening;
+  response.force.head<2>() = part.point;
+  response.force[kNormal] = normal;
+  response.of_friction = part.by_point;
+  response.growth.head<2>() = part.by_normal;
   response.growth[kNormal] = 1.;
   if (size_ == 6) {
-    response.growth.segment<2>(3) = parts.moments.by_normal;
-    response.growth[kYaw] = parts.yaw_growth;
+    moments_.project(point.segment<2>(3), normal, part);
+    const Limited yaw = limit(point[kYaw], normal, yaw_[0], yaw_[1]);
+    stiffness += part.stiffening + yaw.by_normal * yaw.by_normal;
+    response.force.tail<3>() << part.point, yaw.value;
+    response.of_moments = part.by_point;
+    response.of_yaw = yaw.by_value;
+    response.growth.tail<3>() << part.by_normal, yaw.by_normal;
+  } else {
+    response.force.tail<3>().setZero();
+    response.growth.tail<3>().setZero();
   }
-  response.inverse_stiffness = 1. / parts.stiffness;
+  response.inverse_stiffness = is_normal_free ? 1. / stiffness : 0.;
 }
 
 double ScaledSet::findRate(const Vector6& direction) const {
@@ -387,68 +466,74 @@ double ScaledSet::findRate(const Vector6& direction) const {
   return rate;
 }
 
-double ScaledSet::support(const Vector6& direction, double tolerance) const {
+// What may be rounding of the rate.
+double ScaledSet::findRounding(const Vector6& rounding) const {
+  double sum = rounding[kNormal] + friction_.findExtent().dot(rounding.head<2>());
+  if (size_ == 6)
+    sum += moments_.findExtent().dot(rounding.segment<2>(3)) +
+           std::max(-yaw_[0], yaw_[1]) * rounding[kYaw];
+  return sum;
+}
+
+double ScaledSet::support(const Vector6& direction, const Vector6& rounding) const {
   if (is_grasp_) {
     double sum = 0.;
     for (int k = 0; k < 6; ++k)
-      if (std::abs(direction[k]) > tolerance)
+      if (std::abs(direction[k]) > rounding[k])
         sum += direction[k] * (direction[k] > 0. ? upper_[k] : lower_[k]);
     return sum;
   }
   const double rate = findRate(direction);
-  return std::abs(rate) <= tolerance ? 0. : rate * (rate > 0. ? upper_[kNormal] : lower_[kNormal]);
+  return std::abs(rate) <= findRounding(rounding)
+             ? 0.
+             : rate * (rate > 0. ? upper_[kNormal] : lower_[kNormal]);
 }
 
-bool ScaledSet::expose(const Vector6& direction, double tolerance, ScaledSet& face) const {
+bool ScaledSet::expose(const Vector6& direction, const Vector6& rounding, ScaledSet& face) const {
   face = *this;
   if (is_grasp_) {
-    face.lower_ = (direction.array() > tolerance).select(upper_, lower_);
-    face.upper_ = (direction.array() < -tolerance).select(lower_, upper_);
-    const auto is_up = direction.array() > tolerance;
-    const auto is_down = direction.array() < -tolerance;
+    const auto is_up = direction.array() > rounding.array();
+    const auto is_down = direction.array() < -rounding.array();
+    face.lower_ = is_up.select(upper_, lower_);
+    face.upper_ = is_down.select(lower_, upper_);
     return is_up.select(upper_, 0.).allFinite() && is_down.select(lower_, 0.).allFinite();
   }
-  face.friction_ = friction_.expose(direction.head<2>(), tolerance);
+  face.friction_ = friction_.expose(direction.head<2>(), rounding.head<2>());
   if (size_ == 6) {
-    face.moments_ = moments_.expose(direction.segment<2>(3), tolerance);
-    if (direction[kYaw] > tolerance) face.yaw_[0] = yaw_[1];
-    if (direction[kYaw] < -tolerance) face.yaw_[1] = yaw_[0];
+    face.moments_ = moments_.expose(direction.segment<2>(3), rounding.segment<2>(3));
+    if (direction[kYaw] > rounding[kYaw]) face.yaw_[0] = yaw_[1];
+    if (direction[kYaw] < -rounding[kYaw]) face.yaw_[1] = yaw_[0];
   }
-  const double rate = findRate(direction);
+  const double rate = findRate(direction), tolerance = findRounding(rounding);
   if (rate > tolerance) face.lower_[kNormal] = upper_[kNormal];
   if (rate < -tolerance) face.upper_[kNormal] = lower_[kNormal];
   return std::isfinite(face.lower_[kNormal]);
 }
 
 void ScaledSet::hold(const Response& response, const Vector6& direction, ScaledSet& face,
-                     Eigen::Matrix3d& of_force, Eigen::Matrix3d& of_moment) const {
-  of_force.setZero();
-  of_moment.setZero();
+                     Bend& bend) const {
+  bend = Bend();
   face = *this;
+  if (response.is_free) return;
   const Vector6& x = response.force;
+  const auto fixAt = [&](int k) { face.lower_[k] = face.upper_[k] = x[k]; };
+  if (response.inverse_stiffness == 0.) fixAt(kNormal);
   if (is_grasp_) {
-    for (int k = 0; k < 6; ++k)
-      if ((k < 3 ? response.of_force(k, k) : response.of_moment(k - 3, k - 3)) == 0.)
-        face.lower_[k] = face.upper_[k] = x[k];
+    for (int k = 0; k < 2; ++k) {
+      if (response.of_friction(k, k) == 0.) fixAt(k);
+      if (response.of_moments(k, k) == 0.) fixAt(3 + k);
+    }
+    if (response.of_yaw == 0.) fixAt(kYaw);
     return;
   }
   const double normal = x[kNormal];
-  if (response.inverse_stiffness == 0.) face.lower_[kNormal] = face.upper_[kNormal] = normal;
   if (normal <= 0.) return;
-  const auto holdAt = [&](const ScaledSection& section, int first, const auto& by_point,
-                          auto bend) {
-    Matrix2d own;
-    const ScaledSection held =
-        section.hold(x.segment<2>(first), by_point, normal, direction.segment<2>(first), own);
-    bend = own;
-    return held;
-  };
-  face.friction_ = holdAt(friction_, 0, Matrix2d(response.of_force.topLeftCorner<2, 2>()),
-                          of_force.topLeftCorner<2, 2>());
+  face.friction_ =
+      friction_.hold(x.head<2>(), response.of_friction, normal, direction.head<2>(), bend.friction);
   if (size_ == 3) return;
-  face.moments_ = holdAt(moments_, 3, Matrix2d(response.of_moment.topLeftCorner<2, 2>()),
-                         of_moment.topLeftCorner<2, 2>());
-  if (response.of_moment(2, 2) == 0.) face.yaw_.setConstant(x[kYaw] / normal);
+  face.moments_ = moments_.hold(x.segment<2>(3), response.of_moments, normal,
+                                direction.segment<2>(3), bend.moments);
+  if (response.of_yaw == 0.) face.yaw_.setConstant(x[kYaw] / normal);
 }
 
 ScaledSet::Span ScaledSet::span() const {
@@ -490,6 +575,32 @@ ScaledSet::Span ScaledSet::span() const {
   else
     span.fixed = lower_[kNormal] * growth;
   return span;
+}
+
+Eigen::Matrix<signed char, 6, 1> ScaledSet::findBounds(const Response& response,
+                                                       const Vector6& pull) const {
+  Eigen::Matrix<signed char, 6, 1> bounds = Eigen::Matrix<signed char, 6, 1>::Zero();
+  if (response.is_free) return bounds;
+  const Vector6& x = response.force;
+  const auto findOwn = [&](int k) { return findSide(x[k], lower_[k], upper_[k], pull[k]); };
+  if (response.inverse_stiffness == 0.) bounds[kNormal] = findOwn(kNormal);
+  if (is_grasp_) {
+    const Vector6 free = (Vector6() << response.of_friction.diagonal(), 1.,
+                          response.of_moments.diagonal(), response.of_yaw)
+                             .finished();
+    for (int k = 0; k < 6; ++k)
+      if (free[k] == 0.) bounds[k] = findOwn(k);
+    return bounds;
+  }
+  const double normal = x[kNormal];
+  bounds.head<2>() =
+      friction_.findBounds(x.head<2>(), response.of_friction, normal, pull.head<2>());
+  if (size_ == 3) return bounds;
+  bounds.segment<2>(3) =
+      moments_.findBounds(x.segment<2>(3), response.of_moments, normal, pull.segment<2>(3));
+  if (response.of_yaw == 0.)
+    bounds[kYaw] = findSide(x[kYaw], normal * yaw_[0], normal * yaw_[1], pull[kYaw]);
+  return bounds;
 }
 
 }  // namespace dynacom::internal

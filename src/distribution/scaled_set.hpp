@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <vector>
 
 #include "dynacom/contact_set.hpp"
 
@@ -34,14 +35,23 @@ class ScaledSection {
   /// @param scale  of each coordinate
   ScaledSection(const Section& section, const Vector2& scale);
 
+  /// Whether a point is inside, away from what has no extent.
+  bool contains(const Vector2& point, double normal) const;
+
   void project(const Vector2& point, double normal, Response& response) const;
+
+  /// Adds Response::push and Response::stiffening.
+  void addPush(const Vector2& point, double normal, double& push, double& stiffening) const;
 
   /// The support function.
   double support(const Vector2& direction) const;
 
+  /// How far it reaches from the origin along each axis.
+  Vector2 findExtent() const;
+
   /// The face in whose points ⟨direction, p⟩ is largest.
-  /// @param tolerance  what of a direction's components is rounding
-  ScaledSection expose(const Vector2& direction, double tolerance) const;
+  /// @param rounding  what may be rounding of each component of the direction
+  ScaledSection expose(const Vector2& direction, const Vector2& rounding) const;
 
   /// The face that a projection has come to at a normal force > 0: of a curved boundary the point
   /// that a direction exposes.
@@ -52,24 +62,34 @@ class ScaledSection {
 
   Span span() const;
 
+  /// See ScaledSet::findBounds().
+  Eigen::Matrix<signed char, 2, 1> findBounds(const Vector2& point, const Eigen::Matrix2d& by_point,
+                                              double normal, const Vector2& pull) const;
+
  private:
   enum class Shape { Box, Disc, Ellipse, Segment, Polygon };
-  /// Vertices, and of the edges that begin there outward normals of length 1, and how far they are
-  /// from the origin.
-  struct Polygon {
-    Eigen::Matrix2Xd vertices, normals;
-    Eigen::VectorXd offsets;
+  /// A side of a polygon.
+  struct Edge {
+    Vector2 first = Vector2::Zero(), last = Vector2::Zero();  ///< counter-clockwise
+    Vector2 outward = Vector2::Zero();                        ///< its normal, of length 1
+    double offset = 0.;                                       ///< ⟨outward, first⟩
+    double begin = 0., end = 0.;  ///< ⟨along, first⟩, ⟨along, last⟩
+
+    Edge() = default;
+    Edge(const Vector2& first_vertex, const Vector2& last_vertex);
+    Vector2 along() const { return Vector2(-outward.y(), outward.x()); }
+    void project(const Vector2& point, double normal, Response& response) const;
   };
-  static ScaledSection segment(const Vector2& first, const Vector2& last);
-  void projectOnSegment(const Vector2& point, double normal, Response& response) const;
+  explicit ScaledSection(const Edge& edge);
   void projectOnEllipse(const Vector2& point, double normal, Response& response) const;
-  void projectOnPolygon(const Vector2& point, double normal, Response& response) const;
+  const Edge* findEdge(const Vector2& point, double normal) const;
   Vector2 findExposed(const Vector2& direction) const;
 
   Shape shape_ = Shape::Box;
-  Vector2 lower_ = Vector2::Zero(), upper_ = Vector2::Zero();  // of a box; ends of a segment
+  Vector2 lower_ = Vector2::Zero(), upper_ = Vector2::Zero();  // of a box
   Vector2 radii_ = Vector2::Zero();
-  std::shared_ptr<const Polygon> polygon_;  // copies of this allocate nothing
+  Edge edge_;                                         // of a segment
+  std::shared_ptr<const std::vector<Edge>> polygon_;  // copies of this allocate nothing
 };
 
 /// The set of a contact's forces in the coordinates x = W λ of the cost.
@@ -79,12 +99,21 @@ class ScaledSet {
 
   /// The projection of a point on the set, and its generalised Jacobian, which is symmetric:
   ///
-  ///     ∂x/∂g = diag(of_force, of_moment) + growth growthᵀ / stiffness
+  ///     ∂x/∂g = diag(of_friction, 0, of_moments, of_yaw) + growth growthᵀ / stiffness
+  ///
+  /// or 1 where the point is inside, and nothing but the force is set.
   struct Response {
     Vector6 force = Vector6::Zero();
-    Eigen::Matrix3d of_force = Eigen::Matrix3d::Zero(), of_moment = Eigen::Matrix3d::Zero();
+    bool is_free = false;
+    Eigen::Matrix2d of_friction = Eigen::Matrix2d::Zero(), of_moments = Eigen::Matrix2d::Zero();
+    double of_yaw = 0.;
     Vector6 growth = Vector6::Zero();  ///< by which a normal force that is free takes the others
     double inverse_stiffness = 0.;
+  };
+
+  /// ∂x/∂direction of the points of curved boundaries that a direction exposes.
+  struct Bend {
+    Eigen::Matrix2d friction = Eigen::Matrix2d::Zero(), moments = Eigen::Matrix2d::Zero();
   };
 
   /// Forces of a face are fixed + Σ cᵢ axesᵢ.
@@ -107,31 +136,30 @@ class ScaledSet {
   void project(const Vector6& point, Response& response) const;
 
   /// The largest value of ⟨direction, x⟩.
-  /// @param tolerance  what of the components, and of the rate at which it grows with the normal
-  ///                   force, is rounding
-  double support(const Vector6& direction, double tolerance) const;
+  /// @param rounding  what may be rounding of each component of the direction
+  double support(const Vector6& direction, const Vector6& rounding) const;
 
   /// The face whose points ⟨direction, x⟩ is largest in.
   /// @return false if there is none, because that has no limit
-  bool expose(const Vector6& direction, double tolerance, ScaledSet& face) const;
+  bool expose(const Vector6& direction, const Vector6& rounding, ScaledSet& face) const;
 
   /// The face that a projection has come to, see ScaledSection::hold().
-  /// @param of_force, of_moment  ∂x/∂direction of the points on curved boundaries
-  void hold(const Response& response, const Vector6& direction, ScaledSet& face,
-            Eigen::Matrix3d& of_force, Eigen::Matrix3d& of_moment) const;
+  void hold(const Response& response, const Vector6& direction, ScaledSet& face, Bend& bend) const;
 
   Span span() const;
 
+  /// At which of its bounds each component of a projection is: −1, 1, or 0 between them. Of curved
+  /// and slanted sections, both components are 1 on the boundary.
+  /// @param response  of this set, or of one of its faces
+  /// @param pull      says which bound it is where both are the same
+  Eigen::Matrix<signed char, 6, 1> findBounds(const Response& response, const Vector6& pull) const;
+
  private:
-  /// The projections at a normal force.
-  struct Parts {
-    ScaledSection::Response friction, moments;
-    double yaw, yaw_growth;
-    double push, stiffness;  ///< sums of the parts', the latter with that of the normal force
-  };
-  void projectAt(const Vector6& point, double normal, Parts& parts) const;
-  bool findNormal(const Vector6& point, double& normal, Parts& parts) const;
+  bool isInside(const Vector6& point) const;
+  void addPush(const Vector6& point, double normal, double& push, double& stiffness) const;
+  bool findNormal(const Vector6& point, double& normal) const;
   double findRate(const Vector6& direction) const;
+  double findRounding(const Vector6& rounding) const;
 
   bool is_grasp_ = false;
   int size_ = 3;
