@@ -59,7 +59,7 @@ void ContactPolygon::initialize(const ContactPolygonSettings& settings) {
   const bool is_around_origin =
       places_.shape() == Section::Shape::Rectangle && places_.lower() == -places_.upper();
   if (internal::isPyramid(settings_) && is_around_origin && settings_.reference.isZero(0.))
-    setMatrices(matrices.uni_A, matrices.fri_A, settings_.weights);
+    setMatrices(matrices.uni_A, matrices.fri_A, settings_.weights, set);
   else
     setMatrices(matrices.uni_A, matrices.uni_b, matrices.fri_A, matrices.fri_b, settings_.weights,
                 settings_.reference, set);

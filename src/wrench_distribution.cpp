@@ -292,6 +292,7 @@ struct WrenchDistribution::Workspace {
   void takeProblem();
   void rearrange();
   void takeSets();
+  void keepForces();
   bool distribute(double minimal_scale);
   bool distributeBySets(double minimal_scale);
   void writeMultipliers(const DistributionSolution& solution);
@@ -571,6 +572,7 @@ void WrenchDistribution::Workspace::rearrange() {
 // Returns false if there is no answer. What an attempt from the last one has taken in vain comes on
 // top of the iterations that are allowed, and is counted where they leave room for it.
 bool WrenchDistribution::Workspace::distribute(double minimal_scale) {
+  keepForces();
   bool answered = knows_all_sets && distributeBySets(minimal_scale);
   if (has_sets) return answered;
   const int in_vain = knows_all_sets ? sets.solution().iterations_in_vain : 0;
@@ -585,6 +587,12 @@ bool WrenchDistribution::Workspace::distribute(double minimal_scale) {
   }
   result.iterations = std::min(result.iterations + in_vain, maximal_iterations);
   return answered;
+}
+
+// The forces of the answer before, for when there is no other.
+void WrenchDistribution::Workspace::keepForces() {
+  for (std::size_t k = 0; k < solved.size(); ++k)
+    slots[solved[k]].former_force = result.contacts[k].force;
 }
 
 // Contacts whose sets are known.
@@ -625,8 +633,11 @@ void WrenchDistribution::Workspace::writeMultipliers(const DistributionSolution&
     const auto& bounds = solution.bounds[k];
     const auto write = [&](Eigen::Index row, const Row& side, double rest, double of_distance) {
       contact.active[row] = true;
-      contact.multipliers[row] = rest / side.factor;
       if (is_relaxed) contact.relaxation_multipliers[row] = std::max(0., of_distance / side.factor);
+      // Of equations of any sign; else what is below zero is rounding.
+      const double multiplier = rest / side.factor;
+      contact.multipliers[row] =
+          contact.relaxation_multipliers[row] > 0. ? multiplier : std::max(0., multiplier);
     };
     const auto findRest = [&](Eigen::Index i) {
       return contact.NE.col(i).dot(result.wrench_multipliers) -
@@ -666,8 +677,6 @@ bool WrenchDistribution::Workspace::isCertain(const DistributionSolution& soluti
 // Few problems need more digits than double has: those where contacts are nearly parallel, and
 // where the wrench is so close to the boundary that it is barely known which side it is on.
 bool WrenchDistribution::Workspace::distributeRobustly() {
-  for (std::size_t k = 0; k < solved.size(); ++k)
-    slots[solved[k]].former_force = result.contacts[k].force;
   const bool answered = distributeBy(solver);
   const bool proved = answered && result.isOptimal(kProof);
   if (proved && !solver.hasFewDigits()) return true;

@@ -2,16 +2,40 @@
 // Which of the library's solvers a distribution has asked.
 #pragma once
 
-#include <vector>
+#include <array>
+#include <cmath>
 
-#include "dual_newton.hpp"
+#include "dynacom/distribution_solver.hpp"
 #include "dynacom/wrench_distribution.hpp"
 #include "two_stage.hpp"
 
 namespace dynacom_tests {
 
-/// How many solvers have been asked for a result without warm start: 1, Newton's method on the
-/// dual; 2, the robust one, too; 3, this again with more digits.
+/// A contact of a result whose inequalities bound each component by a multiple of the normal force.
+inline dynacom::DistributionProblem::Contact describeBox(
+    const dynacom::DistributionResult::Contact& contact) {
+  std::array<double, 6> limits = {};
+  for (Eigen::Index row = 0; row < contact.A.rows(); ++row)
+    for (Eigen::Index i = 0; i < contact.A.cols(); ++i)
+      if (i != 2 && contact.A(row, i) > 0.)
+        limits[std::size_t(i)] = -contact.A(row, 2) / contact.A(row, i);
+  const Eigen::Vector2d friction(limits[0], limits[1]), half(limits[4], limits[3]);
+  const auto section = dynacom::Section::rectangle(-friction, friction);
+  dynacom::DistributionProblem::Contact described;
+  described.set = contact.A.cols() == 3
+                      ? dynacom::ContactSet::point(section)
+                      : dynacom::ContactSet::surface(
+                            section, dynacom::Section::rectangle(-half, half), limits[5]);
+  described.weights = contact.weights;
+  described.rotation = contact.NE.leftCols<3>().topRows<3>();
+  for (int axis = 0; axis < 3; ++axis)
+    described.lever += 0.5 * Eigen::Vector3d(contact.NE.col(axis).head<3>())
+                                 .cross(Eigen::Vector3d(contact.NE.col(axis).tail<3>()));
+  return described;
+}
+
+/// How many solvers have been asked for a result of pyramids without warm start: 1, the one of all
+/// sets; 2, the robust one, too; 3, this again with more digits.
 /// They are asked again here, one after the other, until the iterations add up; 0 if they do not.
 inline int countAskedSolvers(const dynacom::DistributionResult& result) {
   using Vector6 = dynacom::DistributionResult::Vector6;
@@ -21,18 +45,15 @@ inline int countAskedSolvers(const dynacom::DistributionResult& result) {
   const double unit = result.scale * (1. / overall_weight);  // with the same rounding
   const Vector6 wrench = result.wrench / unit;
   const Vector6 weights = result.wrench_weights * (1. / overall_weight);
-  const Vector6 target = result.wrench_weights.cwiseProduct(result.wrench) / result.scale;
 
-  dynacom::internal::DualNewton newton;
-  newton.reserve(result.contacts.size());
-  std::vector<std::size_t> slots;
-  for (const auto& contact : result.contacts) {
-    slots.push_back(slots.size());
-    newton.setContact(slots.back(), contact);
-  }
-  newton.setActive(slots, result.contacts);
-  newton.solve(result.contacts, target, weights, false, enough);
-  int iterations = newton.iterations();
+  dynacom::DistributionProblem problem;
+  for (const auto& contact : result.contacts) problem.contacts.push_back(describeBox(contact));
+  problem.wrench = result.wrench;
+  problem.wrench_weights = result.wrench_weights;
+  if (result.wrench_weights.cwiseProduct(result.wrench).norm() < result.scale)
+    problem.minimal_scale = result.scale / result.wrench_weights.head<3>().maxCoeff();
+  dynacom::DistributionSolver solver;
+  int iterations = solver.solve(problem).iterations;
   if (iterations == result.iterations) return 1;
 
   dynacom::internal::TwoStageSolver<double> robust;

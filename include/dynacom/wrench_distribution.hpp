@@ -94,8 +94,7 @@ struct DYNACOM_EXPORT WrenchMargin {
 ///
 /// Contacts are held in slots, numbered from 0 on. What is kept from one problem to the next is
 /// kept by slot: storage, so that nothing is allocated for contacts that were reserved or have been
-/// part of a problem before, and which inequalities were active, from where the next solve()
-/// starts.
+/// part of a problem before.
 class DYNACOM_EXPORT WrenchDistribution {
  public:
   using Vector6 = DistributionResult::Vector6;
@@ -120,10 +119,9 @@ class DYNACOM_EXPORT WrenchDistribution {
   void setWrenchWeights(const Vector6& weights);
   const Vector6& getWrenchWeights() const;
 
-  /// Whether solve() starts from the inequalities that were active in each slot's last answer, as
-  /// is the default; else it starts with none. A slot that takes no part in up to ten solve() still
-  /// knows its own afterwards; after more it starts with none, as a foot does that comes down from
-  /// a step. That changes how long it takes, and answers by no more than rounding.
+  /// Whether solve() starts from the multipliers of the last answer, as is the default, as long as
+  /// contacts are the same but for where they are. That changes how long it takes, and answers by
+  /// no more than rounding.
   void setWarmStart(bool warmStart);
   bool getWarmStart() const;
 
@@ -131,7 +129,7 @@ class DYNACOM_EXPORT WrenchDistribution {
   /// DistributionResult::iterations. Of feet on level ground nearly all problems take less than 10;
   /// a problem that needs more than this ends as DistributionStatus::NumericalFailure. A controller
   /// sets 50, or what docs/real_time.md says of the time that it has. A warm start finds its answer
-  /// within the same number as a cold one: one or two iterations that it takes in vain come on top.
+  /// within the same number as a cold one: iterations that it takes in vain come on top.
   /// @throws std::invalid_argument unless maximalIterations > 0
   void setMaximalIterations(int maximalIterations);
   int getMaximalIterations() const;

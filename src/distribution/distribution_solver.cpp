@@ -336,7 +336,7 @@ struct DistributionSolver::Workspace {
   double enough() const { return std::max(may_lack, kRounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
-  bool relaxFrom(double slack);
+  bool relaxFrom(double slack, int steps);
   bool relax(const Vector6& guess);
   bool spanFaces(Matrix6& basis, int& rank, Vector6& fixed);
   bool findResidual(Matrix6& outside);
@@ -422,13 +422,13 @@ void DistributionSolver::Workspace::factorise(double slack, const Matrix6* outsi
 bool DistributionSolver::Workspace::descend(Which which, double slack, const Vector6& centre,
                                             int steps, const Matrix6* outside) {
   double former = std::numeric_limits<double>::infinity();
-  for (int step = 0; iterations < maximal_iterations; ++step) {
+  for (int step = 0;; ++step) {
     const Vector6 gradient = slack * (multipliers - centre) - missing();
     const double size = gradient.norm();
     // What no step makes smaller, and is small, is rounding.
     if (size <= enough() || (size <= kMissing && size > 0.5 * former)) return true;
     former = size;
-    if (step == steps) return false;
+    if (step == steps || iterations >= maximal_iterations) return false;
     ++iterations;
     factorise(slack, outside);
     if (slack == 0. && !hasFullRank()) return false;
@@ -466,7 +466,6 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
                                                          : 0.5 * (lower + upper);
     }
   }
-  return false;
 }
 
 // The multipliers that are the answer if all forces are inside of their sets.
@@ -493,7 +492,8 @@ DistributionStatus DistributionSolver::Workspace::search() {
     evaluate(was_reached ? multipliers : slackened, all);
     if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
     if (was_reached && descend(all, 0., multipliers, kWarmSteps)) return DistributionStatus::Solved;
-    if (!was_reached && relaxFrom(slack)) return DistributionStatus::Relaxed;
+    if (!was_reached && (relaxFrom(slack, 0) || relaxFrom(slack, kWarmSteps)))
+      return DistributionStatus::Relaxed;
     iterations_in_vain = std::exchange(iterations, 0);
   }
   if (startFree() && descend(all, 0., multipliers, kFreeSteps)) return DistributionStatus::Solved;
@@ -506,7 +506,7 @@ DistributionStatus DistributionSolver::Workspace::search() {
   Vector6 centre = Vector6::Zero(), former_missing = Vector6::Zero();
   for (int round = 0; round < kMaximalRounds && iterations < maximal_iterations; ++round) {
     if (round == 0) {
-      if (relaxFrom(slack)) return DistributionStatus::Relaxed;
+      if (relaxFrom(slack, kMaximalSteps)) return DistributionStatus::Relaxed;
     } else {
       descend(all, slack, centre, kMaximalSteps);
     }
@@ -530,8 +530,8 @@ DistributionStatus DistributionSolver::Workspace::search() {
 }
 
 // Out of reach, from the multipliers at hand: the minimum with slack knows the faces.
-bool DistributionSolver::Workspace::relaxFrom(double slack) {
-  descend(&Block::set, slack, Vector6::Zero(), kMaximalSteps);
+bool DistributionSolver::Workspace::relaxFrom(double slack, int steps) {
+  descend(&Block::set, slack, Vector6::Zero(), steps);
   const Vector6 lacking = missing();
   if (!(lacking.norm() > kReach)) return false;
   const Vector6 kept = multipliers;
