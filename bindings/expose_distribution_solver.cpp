@@ -34,12 +34,10 @@ Eigen::Matrix3d toRotation(const bp::object& rows) {
 std::shared_ptr<Contact> makeContact(const ContactSet& set, const bp::object& rotation,
                                      const bp::object& lever, const bp::object& weights,
                                      const bp::object& reference) {
-  Problem problem;
-  problem.contacts.push_back({set, toRotation(rotation), toVector<3>("lever", lever),
-                              toForce("weights", weights, set),
-                              toForce("reference", reference, set)});
-  problem.validate();
-  return std::make_shared<Contact>(std::move(problem.contacts.front()));
+  const Contact contact = {set, toRotation(rotation), toVector<3>("lever", lever),
+                           toForce("weights", weights, set), toForce("reference", reference, set)};
+  contact.validate();
+  return std::make_shared<Contact>(contact);
 }
 
 bp::object getNE(const Contact& self) { return toArray(self.NE()); }
@@ -86,6 +84,15 @@ Solution solve(DistributionSolver& self, const Problem& problem) {
 }
 
 bp::list getForces(const Solution& self) { return toList(self.forces); }
+
+bp::list getBounds(const Solution& self) {
+  bp::list all;
+  for (std::size_t k = 0; k < self.bounds.size(); ++k) {
+    const auto components = self.bounds[k].head(self.forces[k].size());
+    all.append(Eigen::VectorXi(components.cast<int>()));
+  }
+  return all;
+}
 
 std::string writeContact(const Contact& contact) {
   std::string text = internal::concat("DistributionContact(set=", contact.set, ", rotation=[");
@@ -191,7 +198,21 @@ void exposeDistributionSolver() {
           "lambda is the projection of lambda_0 + W^-2 NE' nu, in the metric of W, on its\n"
           "set, or where the wrench is out of reach, on the face of that in which\n"
           "NE' D^2 residual · lambda is largest; (29).")
+      .add_property("bounds", &getBounds,
+                    "Of each contact and component the bound that it is at, -1 or 1, or 0, (3,) or
+                    "
+                    "(6,) of integers: of f_z its own bounds, of others those that grow with it. Of
+                    "
+                    "sections that are no rectangles both components are 1 on the boundary.")
       .def_readonly("iterations", &Solution::iterations, "Steps of Newton's method.")
+      .def_readonly("iterations_in_vain", &Solution::iterations_in_vain,
+                    "How many of these were tried from the last answer, and led nowhere.")
+      .def_readonly("is_accurate", &Solution::is_accurate,
+                    "Whether the answer has all digits that doubles have: not where only the
+                    "
+                    "proximal point method has led to it, and, of Relaxed ones, next to the boundary
+                    "
+                    "and where rounding decides what the residual exposes.")
       .def("isOptimal", &Solution::isOptimal,
            (bp::arg("self"), bp::arg("problem"), bp::arg("tolerance") = 1e-6),
            "Whether this is the answer to a problem, judged by nothing but both: forces in their\n"

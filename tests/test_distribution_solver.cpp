@@ -114,6 +114,49 @@ BOOST_AUTO_TEST_CASE(projections_are_the_nearest_points_and_jacobians_their_chan
   }
 }
 
+BOOST_AUTO_TEST_CASE(bounds_are_those_that_forces_are_at) {
+  for (std::size_t kind = 0; kind < kSetKindNames.size(); ++kind) {
+    SetProblemGenerator generator(21);
+    DistributionSolver solver;
+    int at_bounds = 0;
+    for (int trial = 0; trial < 300; ++trial) {
+      const DistributionProblem problem = generator.next(static_cast<SetKind>(kind)).problem;
+      const DistributionSolution& solution = solver.solve(problem);
+      if (solution.status != DistributionStatus::Solved) continue;
+      for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+        const DistributionProblem::Contact& contact = problem.contacts[k];
+        const Eigen::Index n = contact.set.size();
+        const Eigen::VectorXd& force = solution.forces[k];
+        const double size = 1. + force.lpNorm<Eigen::Infinity>();
+        Eigen::VectorXd weights = Eigen::VectorXd::Ones(n), reference = Eigen::VectorXd::Zero(n);
+        if (contact.weights.size() > 0) weights = contact.weights;
+        if (contact.reference.size() > 0) reference = contact.reference;
+        const Eigen::VectorXd gradient = weights.cwiseAbs2().cwiseProduct(force - reference) -
+                                         contact.NE().transpose() * solution.multipliers;
+        const bool is_inside = solution.bounds[k].head(n).isZero();
+        at_bounds += !is_inside;
+        // Inside nothing pushes back, and at a bound the force is on the boundary.
+        const double terms = weights.cwiseAbs2().maxCoeff() * size +
+                             solution.multipliers.norm() * (1. + contact.lever.norm());
+        if (is_inside)
+          BOOST_TEST(gradient.norm() <= 1e-9 * terms);
+        else
+          BOOST_TEST(contact.set.excess(force) >= -1e-9 * size);
+      }
+    }
+    BOOST_TEST(at_bounds > 100);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(messages_name_the_contact) {
+  DistributionProblem problem;
+  problem.contacts.resize(2);
+  problem.contacts[1].lever.setConstant(std::numeric_limits<double>::infinity());
+  BOOST_CHECK_EXCEPTION(problem.validate(), std::invalid_argument, [](const auto& error) {
+    return std::string(error.what()) == "contacts[1].lever must be finite, got inf inf inf";
+  });
+}
+
 BOOST_AUTO_TEST_CASE(answers_are_those_of_the_solver_of_pyramids) {
   ProblemGenerator generator(11);
   DistributionSolver solver;

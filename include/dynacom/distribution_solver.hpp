@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <limits>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "dynacom/contact_set.hpp"
@@ -30,6 +31,9 @@ struct DYNACOM_EXPORT DistributionProblem {
     Eigen::VectorXd weights;    ///< the diagonal of W, > 0, set.size(); 1 if empty
     Eigen::VectorXd reference;  ///< λ₀, set.size(); 0 if empty
 
+    /// @param prefix  of names in messages
+    /// @throws std::invalid_argument naming what is not finite, or of another size or range
+    void validate(const std::string& prefix = "") const;
     /// Takes λ to the wrench about the CoM: [R 0; [p]×R R], of points its first three columns.
     Eigen::Matrix<double, 6, Eigen::Dynamic> NE() const;
   };

@@ -204,23 +204,25 @@ void DistributionProblem::validate() const {
     throwInvalid("wrench_weights must be finite and > 0, got ", wrench_weights.transpose());
   if (!(std::isfinite(minimal_scale) && minimal_scale >= 0.))
     throwInvalid("minimal_scale must be finite and >= 0, got ", minimal_scale);
-  for (const Contact& contact : contacts) {
-    const Index size = contact.set.size();
-    if (!internal::isOrthonormal(contact.rotation))
-      throwInvalid("rotation must be orthonormal, got\n", contact.rotation);
-    if (!contact.lever.allFinite())
-      throwInvalid("lever must be finite, got ", contact.lever.transpose());
-    if (contact.weights.size() != 0) {
-      internal::requireSize("weights", contact.weights.size(), size, "components (or none)");
-      if (!contact.weights.allFinite() || !(contact.weights.array() > 0.).all())
-        throwInvalid("weights must be finite and > 0, got ", contact.weights.transpose());
-    }
-    if (contact.reference.size() != 0) {
-      internal::requireSize("reference", contact.reference.size(), size, "components (or none)");
-      if (!contact.reference.allFinite())
-        throwInvalid("reference must be finite, got ", contact.reference.transpose());
-    }
-  }
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    contacts[k].validate(internal::concat("contacts[", k, "]."));
+}
+
+void DistributionProblem::Contact::validate(const std::string& prefix) const {
+  const auto name = [&](const char* field) { return prefix + field; };
+  const auto require = [&](const char* field, const Eigen::VectorXd& values) {
+    if (values.size() != 0)
+      internal::requireSize(name(field).c_str(), values.size(), set.size(), "components (or none)");
+  };
+  if (!internal::isOrthonormal(rotation))
+    throwInvalid(name("rotation"), " must be orthonormal, got\n", rotation);
+  if (!lever.allFinite()) throwInvalid(name("lever"), " must be finite, got ", lever.transpose());
+  require("weights", weights);
+  if (!weights.allFinite() || !(weights.array() > 0.).all())
+    throwInvalid(name("weights"), " must be finite and > 0, got ", weights.transpose());
+  require("reference", reference);
+  if (!reference.allFinite())
+    throwInvalid(name("reference"), " must be finite, got ", reference.transpose());
 }
 
 double DistributionProblem::scale() const {
@@ -336,11 +338,10 @@ struct DistributionSolver::Workspace {
   double enough() const { return std::max(may_lack, kRounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
-  bool relaxFrom(double slack, int steps);
-  bool relax(const Vector6& guess);
+  bool relax(const Vector6& start);
   bool spanFaces(Matrix6& basis, int& rank, Vector6& fixed);
   bool findResidual(Matrix6& outside);
-  bool reachClosest(const Matrix6& outside);
+  bool reachClosest(const Vector6& start, const Matrix6& outside);
   bool exposesClearly();
   bool reachOnFaces(const Matrix6& outside);
   std::vector<Vector6> directions;
@@ -489,11 +490,16 @@ DistributionStatus DistributionSolver::Workspace::search() {
   double slack = kFirstSlack * findMeanCompliance();
   if (warm_start && has_answer) {
     const bool was_reached = solution.status == DistributionStatus::Solved;
-    evaluate(was_reached ? multipliers : slackened, all);
+    const Vector6 last = multipliers;
+    evaluate(was_reached ? last : slackened, all);
     if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
-    if (was_reached && descend(all, 0., multipliers, kWarmSteps)) return DistributionStatus::Solved;
-    if (!was_reached && (relaxFrom(slack, 0) || relaxFrom(slack, kWarmSteps)))
-      return DistributionStatus::Relaxed;
+    if (was_reached) {
+      if (descend(all, 0., last, kWarmSteps)) return DistributionStatus::Solved;
+    } else {
+      if (relax(last)) return DistributionStatus::Relaxed;
+      descend(all, slack, Vector6::Zero(), kWarmSteps);
+      if (relax(last)) return DistributionStatus::Relaxed;
+    }
     iterations_in_vain = std::exchange(iterations, 0);
   }
   if (startFree() && descend(all, 0., multipliers, kFreeSteps)) return DistributionStatus::Solved;
@@ -505,21 +511,13 @@ DistributionStatus DistributionSolver::Workspace::search() {
   double former = std::numeric_limits<double>::infinity();
   Vector6 centre = Vector6::Zero(), former_missing = Vector6::Zero();
   for (int round = 0; round < kMaximalRounds && iterations < maximal_iterations; ++round) {
-    if (round == 0) {
-      if (relaxFrom(slack, kMaximalSteps)) return DistributionStatus::Relaxed;
-    } else {
-      descend(all, slack, centre, kMaximalSteps);
-    }
+    descend(all, slack, centre, kMaximalSteps);
     const Vector6 lacking = missing();
     const double size = lacking.norm();
     if (size <= enough()) return DistributionStatus::Solved;
     // What stays is out of reach, if it proves so.
     const bool stays = (lacking - former_missing).norm() <= 0.1 * size;
-    if (round > 0 && size > kReach && stays) {
-      const Vector6 kept = multipliers;
-      if (relax(lacking)) return DistributionStatus::Relaxed;
-      evaluate(kept, all);
-    }
+    if ((round == 0 || stays) && relax(multipliers)) return DistributionStatus::Relaxed;
     former_missing = lacking;
     if (size > kFall * former) slack = std::max(slack * kSlackFactor, least_slack);
     former = size;
@@ -527,20 +525,6 @@ DistributionStatus DistributionSolver::Workspace::search() {
   }
   return missing().norm() <= kReach ? DistributionStatus::Solved
                                     : DistributionStatus::NumericalFailure;
-}
-
-// Out of reach, from the multipliers at hand: the minimum with slack knows the faces.
-bool DistributionSolver::Workspace::relaxFrom(double slack, int steps) {
-  descend(&Block::set, slack, Vector6::Zero(), steps);
-  const Vector6 lacking = missing();
-  if (!(lacking.norm() > kReach)) return false;
-  const Vector6 kept = multipliers;
-  if (relax(lacking)) {
-    slackened = kept;
-    return true;
-  }
-  evaluate(kept, &Block::set);
-  return false;
 }
 
 // An orthonormal basis of the wrenches that the faces span, and the wrench that all forces in them
@@ -643,23 +627,30 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside) {
 
 // Out of reach: the closest wrench, then the cheapest forces of those on the faces that its
 // residual exposes, and the proof of both.
-bool DistributionSolver::Workspace::relax(const Vector6& guess) {
-  Matrix6 outside;
-  residual = guess;
-  const bool is_found = findResidual(outside);
-  if (!is_found || !reachClosest(outside)) {
-    residual.setZero();
-    return false;
+//
+// What the minimum with slack lacks is nearly the residual.
+// @param start  from which multipliers on the forces are sought
+bool DistributionSolver::Workspace::relax(const Vector6& start) {
+  residual = missing();
+  if (residual.norm() > kReach) {
+    const Vector6 kept = multipliers;
+    Matrix6 outside;
+    if (findResidual(outside) && reachClosest(start, outside)) {
+      slackened = kept;
+      return true;
+    }
+    evaluate(kept, &Block::set);
   }
-  return true;
+  residual.setZero();
+  return false;
 }
 
 // The cheapest forces that leave the residual, and the proof of both.
-bool DistributionSolver::Workspace::reachClosest(const Matrix6& outside) {
+bool DistributionSolver::Workspace::reachClosest(const Vector6& start, const Matrix6& outside) {
   const double size = residual.norm();
   const Vector6 asked = target;
   target -= residual;
-  multipliers -= Vector6(outside * multipliers);
+  multipliers = start - outside * start;
   const bool given = reachOnFaces(outside);
   target = asked;
   if (!given) return false;
