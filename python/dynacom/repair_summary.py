@@ -28,6 +28,14 @@ _HINTS = {
     "downward_normal": "the contacts of the robot's file may be turned",
 }
 
+#: What is told of contacts, before and after: as in RepairedFeet, what it is called, unit.
+FEET = {
+    "speed": ("Contacts slide by up to", "m/s"),
+    "drift": ("Contacts drift by up to", "m"),
+    "sunk": ("Contacts are below the ground by up to", "m"),
+    "floating": ("Contacts that carry are above it by up to", "m"),
+}
+
 #: Changes of the motion: key in the summary, what it is called, unit.
 CHANGES = (
     ("root", "Root displaced", "m"),
@@ -87,46 +95,12 @@ def _change(repair: MotionRepair, change: RepairChange) -> dict[str, Any]:
 
 
 def _stances(robot: Robot, repair: MotionRepair) -> dict[str, Any]:
-    """Those of the last step, of the robot's contacts."""
+    """Those of the last step, of the robot's contacts, and how these stand."""
     stances = [stance for stance in repair.stances if stance.contact < len(robot.contacts)]
-    speeds = [_largest_speed(found) for found in (repair.before, repair.after)]
-    drifts = [
-        max((_drift(repair, found, stance) for stance in stances), default=None)
-        for found in (repair.before, repair.after)
-    ]
-    return {
-        "count": len(stances),
-        "held": sum(stance.is_still for stance in stances),
-        "largest_speed_before": speeds[0],
-        "largest_speed": speeds[1],
-        "largest_drift_before": drifts[0],
-        "largest_drift": drifts[1],
-    }
-
-
-def _largest_speed(found: MotionExamination) -> float:
-    """Of what is judged as ``foot_sliding`` [m/s]."""
-    return found.verdict.findings["foot_sliding"].worst
-
-
-def _drift(repair: MotionRepair, found: MotionExamination, stance: Any) -> float:
-    """The largest distance of a part that carries in a stance from where it is on average [m].
-
-    Which parts carry when is that of the motion after, before and after.
-    """
-    after = repair.after
-    frames = slice(stance.first, stance.behind)
-    carried = found.inference.ground_velocity * (found.derived.motion.time[frames, None])
-    active = np.asarray(after.inference.schedule.active)[frames]
-    largest = 0.0
-    for index, (part, motion) in enumerate(zip(after.parts, found.part_motions, strict=False)):
-        carries = active[:, index].astype(bool)
-        if part.contact != stance.contact or not carries.any():
-            continue
-        places = (motion.position[frames] - carried)[carries]
-        distances = np.linalg.norm(places - places.mean(axis=0), axis=1)
-        largest = max(largest, float(distances.max()))
-    return largest
+    found = {"count": len(stances), "held": sum(stance.is_still for stance in stances)}
+    for ending, feet in (("_before", repair.feet_before), ("", repair.feet)):
+        found |= {f"largest_{name}{ending}": getattr(feet, name) for name in FEET}
+    return found
 
 
 # Steps.
@@ -206,11 +180,8 @@ def compared_values(repair: Mapping[str, Any]) -> Iterator[tuple[str, str, Any, 
         ("Frames out of reach", "frames", "frames"),
     ):
         yield title, unit, before.get(key), after.get(key)
-    for title, key, unit in (
-        ("Contacts slide by up to", "largest_speed", "m/s"),
-        ("Contacts drift by up to", "largest_drift", "m"),
-    ):
-        yield title, unit, stances.get(f"{key}_before"), stances.get(key)
+    for name, (title, unit) in FEET.items():
+        yield title, unit, stances.get(f"largest_{name}_before"), stances.get(f"largest_{name}")
     if any(limits.values()):
         yield "Joints beyond limits by", "rad", limits.get("before"), limits.get("after")
 
