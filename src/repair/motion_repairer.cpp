@@ -319,7 +319,8 @@ class MotionRepairer::Workspace::Ladder {
     goOn(settings, contacts, below, best);
   }
 
-  // From the rung below, if no wrench is lost for it, nor joints go farther beyond their limits.
+  // From the rung below, if no wrench is lost for it, and joints that were to come nearer to their
+  // limits do.
   // Where balance alone has not led to where contacts are found again, feet that are level may.
   bool goOn(const RepairSettings& settings, const Contacts& contacts, const Standing& below,
             std::optional<Attempt>& best) {
@@ -327,9 +328,10 @@ class MotionRepairer::Workspace::Ladder {
     Attempt attempt = is_balanced ? repeat(settings, best->contacts, best->q)
                                   : repeat(settings, contacts, found_.before.derived.motion.q);
     const Standing found = attempt.standing;
-    const bool is_kept =
-        isSmall(attempt.change) && !isWorse(found, below) &&
-        (!settings.joints || found.excess <= std::max(below.excess, kWithinLimits));
+    const bool are_limits_better =
+        found.excess <= kWithinLimits || found.excess < below.excess - kWithinLimits;
+    const bool is_kept = isSmall(attempt.change) && !isWorse(found, below) &&
+                         (!settings.joints || are_limits_better);
     if (settings.feet)
       found_.steps.push_back({RepairRung::Feet, below.slide, found.slide, is_kept});
     if (settings.joints && (is_kept || !settings.feet))

@@ -364,14 +364,20 @@ double WholeBodyWindow::weigh(const Constraint& constraint) const {
 }
 
 double WholeBodyWindow::weighChange(Index frame) const {
-  const bool is_end = frame == 0 || frame == problem_.time.size() - 1;
-  return differ(frame).duration * (problem_.pinned_ends && is_end ? kAnchor : 1.);
+  return differ(frame).duration * (problem_.pinned_ends && isEnd(frame) ? kAnchor : 1.);
+}
+
+// Of squares of how far points are from their places. Where the wrench at an end of the motion
+// depends on them, the root is at rest, and feet would have to move instead.
+double WholeBodyWindow::weighPlaces(Index frame) const {
+  const bool is_near_end = std::min(frame, problem_.time.size() - 1 - frame) <= kFarthest;
+  return differ(frame).duration * hold_ * (is_near_end ? kRest : 1.);
 }
 
 // Of squares of accelerations in a frame.
 Eigen::VectorXd WholeBodyWindow::weighAcceleration(Index frame) const {
   Eigen::VectorXd costs = differ(frame).duration * problem_.of_acceleration;
-  if (frame == 0 || frame == problem_.time.size() - 1) costs.head<6>() *= kRest;
+  if (isEnd(frame)) costs.head<6>() *= kRest;
   return costs;
 }
 
@@ -426,7 +432,7 @@ bool WholeBodyWindow::factorize(double penalty, double penalty_of_places) {
     if (constraint.off.size() > 0)
       block(frame, frame)
           .selfadjointView<Eigen::Lower>()
-          .rankUpdate(constraint.of_places.transpose(), differ(frame).duration * hold_);
+          .rankUpdate(constraint.of_places.transpose(), weighPlaces(frame));
     const double weight = weigh(constraint);
     const auto& terms = constraint.linear.terms;
     for (std::size_t i = 0; i < terms.size(); ++i)
@@ -465,7 +471,7 @@ void WholeBodyWindow::iterate(bool with_costs, Eigen::MatrixXd& change) {
     const Index frame = constraint.frame;
     if (constraint.off.size() > 0)
       step_.col(frame - first_).noalias() -=
-          differ(frame).duration * hold_ * constraint.of_places.transpose() * constraint.off;
+          weighPlaces(frame) * constraint.of_places.transpose() * constraint.off;
     const Vector6 off = weigh(constraint) * (constraint.moved - constraint.given + constraint.dual);
     for (const auto& term : constraint.linear.terms)
       if (isSought(term.frame))
