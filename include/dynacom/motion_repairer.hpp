@@ -118,15 +118,16 @@ struct MotionRepair {
   std::vector<RepairedStance> stances;  ///< of the last rung
   /// In `before` and in `after`, where what carries in `after` does.
   RepairedFeet feet_before, feet;
-  double ground_offset = 0.;            ///< by which all was lifted, besides these changes [m]
-  double ground_tilt = 0.;              ///< by which it was turned before that [rad]
-  double stretch = 1.;                  ///< of time
+  double ground_offset = 0.;  ///< by which all was lifted, besides these changes [m]
+  double ground_tilt = 0.;    ///< by which it was turned before that [rad]
+  double stretch = 1.;        ///< of time
   std::vector<RepairStep> steps;
   /// Of `Repaired` and `Feasible` none. Codes are those of faults, and `contact_needed` where
   /// nothing carries, `out_of_reach` where what carries cannot give what is needed,
   /// `joint_limits`, `feet_not_held` where contacts were to stand still and drift by more than
-  /// RepairSettings::largest_drift in a stance, `bound` where settings do not allow so much, `not_better` where all that was
-  /// tried is worse, and the motion stays as it was, and `too_short`.
+  /// RepairSettings::largest_drift in a stance, `bound` where settings do not allow so much,
+  /// `not_better` where all that was tried is worse, and the motion stays as it was, and
+  /// `too_short`.
   std::vector<RepairReason> reasons;
 };
 

@@ -25,7 +25,7 @@ constexpr int kFarRounds = 5, kFarIterations = 8;
 // Then, costs count no more: the nearest motion within the cones, in which points and joints that
 // are held stay as they are, with larger penalties.
 constexpr double kPolish = 100., kPolishPlaces = 100.;
-constexpr int kPolishes = 8, kPolishIterations = 8;
+constexpr int kPolishes = 12, kPolishIterations = 8;
 // What is missing after that is rounding [m g, m g·m]: with more, distributions are not Solved.
 constexpr double kReached = 1e-10;
 // The polish ends where so many rounds in a row leave more than this part of what was missing
@@ -173,9 +173,11 @@ void WholeBodyWindow::polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q) {
   q.middleCols(first_, behind_ - first_) = best_q;
 }
 
-// Lets points and joints that are held be so where they are.
+// Lets points that are held be so where they are, and joints that are within their own limits.
 void WholeBodyWindow::stay() {
   for (Constraint& constraint : constraints_) constraint.off.setZero();
+  for (Pin& pin : pins_)
+    if (!(pin.own > 0.)) pin.off = 0.;
 }
 
 // The frames whose wrench depends on what is sought, and of which something is asked.
@@ -312,8 +314,9 @@ double WholeBodyWindow::pin(const Eigen::MatrixXd& q) {
         if (!isOfStep(kind) && !isSought(frame)) continue;
         const double off = measureExcess(joint, kind, problem_.time, q, frame);
         if (!(off > 0.)) continue;
-        pins_.push_back({frame, &joint, kind, off});
-        largest = std::max(largest, measureOwnExcess(joint, kind, problem_.time, q, frame));
+        const double own = measureOwnExcess(joint, kind, problem_.time, q, frame);
+        pins_.push_back({frame, &joint, kind, off, own});
+        largest = std::max(largest, own);
       }
   return largest;
 }

@@ -72,6 +72,7 @@ class WholeBodyWindow {
     const LimitedJoint* joint;
     LimitKind kind;
     double off;
+    double own;  // how far it is beyond its own limit; negative within
   };
 
   Difference differ(Eigen::Index frame) const;
