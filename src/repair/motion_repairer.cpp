@@ -59,6 +59,9 @@ constexpr double kGiven = 1e-3;
 constexpr double kFarther = 1.5, kFartherBy = 0.003;
 // Joints that are no farther beyond their limits are within them: so much comes of rounding.
 constexpr double kWithinLimits = 1e-9;
+// Where limits are not looked after, so much counts as nothing [rad], [m]: a gripper that is at its
+// limit goes beyond it with any change.
+constexpr double kNearLimits = 1e-3;
 // A motion whose joints are accelerated so many times as much as before, and as one that is calm
 // [rad/s²], RMS, is worse.
 constexpr double kWilder = 3., kCalm = 3.;
@@ -480,7 +483,7 @@ class MotionRepairer::Workspace::Ladder {
 
   // Also where nobody asked for them.
   void explainLimits() {
-    if (!(found_.joint_excess > kWithinLimits)) return;
+    if (!(found_.joint_excess > (settings_.repair.joints ? kWithinLimits : kNearLimits))) return;
     const internal::LargestExcess largest =
         internal::findLargestExcess(model(), recorded_.time, found_.recorded.q);
     const auto& joints = model().idx_vs;
