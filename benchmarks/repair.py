@@ -1,12 +1,14 @@
 """What repair makes of motions of other people: the tables of docs/repair.md, in Markdown.
 
-Clips are repaired by dynacom.repair, once with wrenches only, and once with feet and joints.
+Clips are repaired by dynacom.repair, once with wrenches only, and once with feet and joints;
+--feet tells how still and how high feet stand then, of these and of robots that lean.
 Motions whose forces were measured are repaired by repairMotion, wrenches only, with the contacts
 that were found in them, and analysed with the same; nothing is asked of frames that are unsure.
 """
 
 import argparse
 import sys
+import tempfile
 import time
 from collections import Counter
 from pathlib import Path
@@ -75,6 +77,21 @@ def slide(found):
     return 100.0 * finding.frames / found.statistics.frames
 
 
+def solved(report):
+    """Which part of the judged frames is Solved, with nothing missing but rounding [%]."""
+    status = np.array([str(status) for status in report["status"]])
+    judged = ~np.asarray(report.examination.verdict.unsure)
+    return f"{100.0 * np.mean(status[judged] == 'Solved'):.1f}"
+
+
+def solved_written(report):
+    """The same of the file, read again."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / report.clip.path.name
+        report.write(path)
+        return solved(report.examine_written(report.read_again(path)))
+
+
 def cells(report):
     """Of a clip's repair."""
     made = report.repair
@@ -82,6 +99,8 @@ def cells(report):
     return [
         f"{share(made.missing_before, before):.0f}",
         f"{share(made.missing, after):.1f}",
+        solved(report.after),
+        solved_written(report),
         f"{slide(before):.1f}",
         f"{slide(after):.1f}",
         span(made.root, 1e3, 1),
@@ -108,6 +127,8 @@ def read_samples(data, names):
 REPAIRED = [
     "reach before [%]",
     "after [%]",
+    "Solved [%]",
+    "in the file [%]",
     "slides before [%]",
     "after [%]",
     "root [mm]",
@@ -131,6 +152,67 @@ def print_clips(data, names):
             mended = "wrenches" if balance_only else "all"
             before = report.repair.before.verdict.outcome
             print_row([name, before, mended, *cells(report), f"{spent:.0f}"])
+
+
+# ---- Feet ----
+
+# Frames so near to the first and the last of a stance, touch-down and lift-off, are not inside.
+AROUND = 2
+
+
+def measure_held(report):
+    """Speeds [mm/s] and heights over the ground [mm], by differences of two frames, of parts that
+    carry all the time inside stances that are held still, and how many stances these are."""
+    found, stances = report.after.examination, report.repair.stances
+    held = [s for s in stances if s.is_still and s.contact < len(report.robot.contacts)]
+    active = np.asarray(found.inference.schedule.active)
+    time = found.derived.motion.time
+    parts = dynacom.splitContacts(report.robot.dynacom(), found.links)
+    ground = dynacom.findRepairGround(parts, found.inference, time)
+    speeds, heights = [], []
+    for stance in held:
+        inside = np.arange(stance.first + AROUND, stance.behind - AROUND)
+        for number, part in enumerate(found.parts):
+            if part.contact != stance.contact or not len(inside):
+                continue
+            if not active[inside, number].all():
+                continue
+            places = found.part_motions[number].position
+            steps = (places[inside + 1] - places[inside - 1]).T / (
+                time[inside + 1] - time[inside - 1]
+            )
+            moved = steps.T - found.inference.ground_velocity
+            speeds.extend(1e3 * np.linalg.norm(moved, axis=1))
+            heights.extend(1e3 * (places[inside, 2] - ground.height[inside, number]))
+    return len(held), np.array(speeds), np.array(heights)
+
+
+def largest_and_share(values, limit):
+    """The largest and which part is no larger than a limit [%]."""
+    return [f"{np.nanmax(values):.2g}", f"{100.0 * np.mean(values <= limit):.1f}"]
+
+
+def print_feet(data, names):
+    print_head(
+        ["motion", "outcome", "held", "largest speed [mm/s]", "≤ 3 mm/s [%]"]
+        + ["farthest from the ground [mm]", "≤ 1 mm [%]"]
+    )
+    for name, robot, clip in [*read_samples(data, names), *read_cases(data, names)]:
+        report = dynacom.repair(clip, robot, threads=1)
+        held, speeds, heights = measure_held(report)
+        count = report.summary["repair"]["stances"]["count"]
+        cells = ["", "", "", ""]
+        if len(speeds):
+            cells = largest_and_share(speeds, 3.0) + largest_and_share(np.abs(heights), 1.0)
+        print_row([name, report.outcome, f"{held} of {count}", *cells])
+
+
+def read_cases(data, names):
+    """Robots that lean, statically, with their names."""
+    robot = dynacom.load_robot("talos")
+    for name in ("lean_05cm", "fallonefoot_05cm", "tiptoe30_heel"):
+        if not names or any(part in name for part in names):
+            yield name, robot, dynacom.read_motion(data / "cases" / f"{name}.npz", robot)
 
 
 # ---- Motions made from clips ----
@@ -216,11 +298,14 @@ def main():
     add("names", nargs="*", help="only what has one of these in its name")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--forces", action="store_true", help="motions with measured forces")
+    which.add_argument("--feet", action="store_true", help="how feet stand in repaired clips")
     which.add_argument("--derived", action="store_true", help="motions made from clips")
     arguments = parser.parse_args()
     table = print_clips
     if arguments.forces:
         table = print_forces
+    elif arguments.feet:
+        table = print_feet
     elif arguments.derived:
         table = print_derived
     table(arguments.data, arguments.names)
