@@ -7,6 +7,7 @@ that were found in them, and analysed with the same; nothing is asked of frames 
 """
 
 import argparse
+import resource
 import sys
 import tempfile
 import time
@@ -156,13 +157,23 @@ def print_clips(data, names):
 
 # ---- Feet ----
 
-# Frames so near to the first and the last of a stance, touch-down and lift-off, are not inside.
+# Frames so near to one in which a part of the foot touches down or lifts off are not inside.
 AROUND = 2
 
 
+def inside(active, stance):
+    """Frames of a stance around which the same parts of its foot carry: active is (T, parts)."""
+    frames = range(stance.first + AROUND, stance.behind - AROUND)
+    return [
+        frame
+        for frame in frames
+        if (active[frame - AROUND : frame + AROUND + 1] == active[frame]).all()
+    ]
+
+
 def measure_held(report):
-    """Speeds [mm/s] and heights over the ground [mm], by differences of two frames, of parts that
-    carry all the time inside stances that are held still, and how many stances these are."""
+    """Speeds [mm/s] and heights over the ground [mm] of parts that carry inside stances that are
+    held still, by differences of two frames, and how many stances these are."""
     found, stances = report.after.examination, report.repair.stances
     held = [s for s in stances if s.is_still and s.contact < len(report.robot.contacts)]
     active = np.asarray(found.inference.schedule.active)
@@ -171,19 +182,13 @@ def measure_held(report):
     ground = dynacom.findRepairGround(parts, found.inference, time)
     speeds, heights = [], []
     for stance in held:
-        inside = np.arange(stance.first + AROUND, stance.behind - AROUND)
-        for number, part in enumerate(found.parts):
-            if part.contact != stance.contact or not len(inside):
-                continue
-            if not active[inside, number].all():
-                continue
-            places = found.part_motions[number].position
-            steps = (places[inside + 1] - places[inside - 1]).T / (
-                time[inside + 1] - time[inside - 1]
-            )
-            moved = steps.T - found.inference.ground_velocity
-            speeds.extend(1e3 * np.linalg.norm(moved, axis=1))
-            heights.extend(1e3 * (places[inside, 2] - ground.height[inside, number]))
+        own = [k for k, part in enumerate(found.parts) if part.contact == stance.contact]
+        for frame in inside(active[:, own], stance):
+            for part in np.array(own)[active[frame, own]]:
+                places = found.part_motions[part].position[frame - 1 : frame + 2]
+                step = (places[2] - places[0]) / (time[frame + 1] - time[frame - 1])
+                speeds.append(1e3 * np.linalg.norm(step - found.inference.ground_velocity))
+                heights.append(1e3 * (places[1, 2] - ground.height[frame, part]))
     return len(held), np.array(speeds), np.array(heights)
 
 
@@ -213,6 +218,60 @@ def read_cases(data, names):
     for name in ("lean_05cm", "fallonefoot_05cm", "tiptoe30_heel"):
         if not names or any(part in name for part in names):
             yield name, robot, dynacom.read_motion(data / "cases" / f"{name}.npz", robot)
+
+
+# ---- Growth with the length ----
+
+
+def back_and_forth(clip, times):
+    """The times and configurations of a clip that is played so often, every other time backward."""
+    q = np.concatenate([clip.q if turn % 2 == 0 else clip.q[::-1] for turn in range(times)])
+    return np.arange(len(q)) * np.diff(clip.time).mean(), q
+
+
+def largest_memory():
+    """Of this process so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def print_growth(data, names):
+    print_head(["clip", "frames", "minutes", "µs a frame", "memory [MB]", "a minute more [MB]"])
+    for name, robot, clip in read_samples(data, names or ["J_Dance0"]):
+        examiner = dynacom.MotionExaminer(robot.dynacom(), threads=1, sensitivity=False)
+        repairer = dynacom.MotionRepairer(robot.dynacom(), examiner)
+        earlier = None
+        for times in (1, 4, 16):
+            recorded = dynacom.RecordedMotion(*back_and_forth(clip, times))
+            start = time.process_time()
+            repairer.repair(recorded)
+            frames, minutes = len(recorded.time), recorded.time[-1] / 60.0
+            spent = 1e6 * (time.process_time() - start) / frames
+            memory = largest_memory()
+            more = "" if earlier is None else (memory - earlier[0]) / (minutes - earlier[1])
+            earlier = memory, minutes
+            cells = [str(frames), f"{minutes:.1f}", f"{spent:.0f}", f"{memory:.0f}"]
+            print_row([name, *cells, f"{more:.1f}" if more else ""])
+
+
+def print_filter(data, names):
+    """The centroidal filter alone, with contacts that are known, on one core."""
+    print_head(["clip", "frames", "iterations", "distance [mm]", "frames a second"])
+    for name, robot, clip in read_samples(data, names):
+        found = dynacom.analyze(clip, robot, sensitivity=False, threads=1).examination
+        parts = dynacom.splitContacts(robot.dynacom(), found.links)
+        dynamics = dynacom.analyzeMotion(
+            parts.robot, found.derived.motion, found.inference.schedule
+        )
+        seconds = []
+        for _ in range(5):
+            start = time.process_time()
+            change = dynacom.distanceToFeasible(
+                parts, found.part_motions, dynamics, found.inference.schedule, threads=1
+            )
+            seconds.append(time.process_time() - start)
+        frames = len(clip.time)
+        cells = [str(frames), str(change.iterations), f"{1e3 * change.rms:.1f}"]
+        print_row([name, *cells, f"{frames / np.median(seconds):.0f}"])
 
 
 # ---- Motions made from clips ----
@@ -299,6 +358,8 @@ def main():
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--forces", action="store_true", help="motions with measured forces")
     which.add_argument("--feet", action="store_true", help="how feet stand in repaired clips")
+    which.add_argument("--growth", action="store_true", help="time and memory of long motions")
+    which.add_argument("--filter", action="store_true", help="the centroidal filter alone")
     which.add_argument("--derived", action="store_true", help="motions made from clips")
     arguments = parser.parse_args()
     table = print_clips
@@ -306,6 +367,10 @@ def main():
         table = print_forces
     elif arguments.feet:
         table = print_feet
+    elif arguments.growth:
+        table = print_growth
+    elif arguments.filter:
+        table = print_filter
     elif arguments.derived:
         table = print_derived
     table(arguments.data, arguments.names)
