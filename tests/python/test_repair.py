@@ -236,6 +236,16 @@ def test_strict_mends_single_frames(talos, tmp_path):
     assert set(report.after["status"]) == {"Solved"}
 
 
+def test_nothing_is_missing_but_rounding(anymal, tmp_path):
+    """Rounds go on until all frames are Solved, also those in which hardly anything is missing."""
+    with np.load(WALKS / "anymal_trot.npz") as file:
+        np.savez(tmp_path / "trot.npz", t=file["t"] / 3.0, q=file["q"])
+    report = dynacom.repair(tmp_path / "trot.npz", anymal)
+    unsure = np.asarray(report.after.examination.verdict.unsure)
+    assert np.count_nonzero(~unsure) > 100
+    assert {str(status) for status in report.after["status"][~unsure]} == {"Solved"}
+
+
 def test_what_repair_has_written_is_fine(talos, hurried):
     """Strictly so: repaired motions are left as they are."""
     again = dynacom.repair(hurried.motion, talos, strict=True)
