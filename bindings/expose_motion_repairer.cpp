@@ -155,8 +155,9 @@ void exposeMotionRepairer() {
       "climbed as far as they lead. Motions are filtered as for their verdict, and taken for "
       "exact\n"
       "from then on; wrenches are brought within reach by repairMotion, and contacts found once\n"
-      "more in what came out, until both agree; then the same with feet and joints, which counts\n"
-      "only if it leaves wrenches within reach. See docs/repair.md.",
+      "more in what came out, until all is solved, some rounds at most; then the same with\n"
+      "feet and joints, and where feet cannot be held with joints alone, which count only if they\n"
+      "leave wrenches within reach. See docs/repair.md.",
       bp::no_init)
       .def("__init__",
            bp::make_constructor(

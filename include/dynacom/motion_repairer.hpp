@@ -137,8 +137,8 @@ struct MotionRepair {
 /// its verdict, and taken for exact from then on: contacts are found anew, unless that makes it
 /// much farther from a feasible one, as where soles are tilted by mistake. Then wrenches are
 /// brought within reach by repairMotion(), and contacts found once more in what came out, until
-/// both agree; then the same with feet and joints, which counts only if it leaves wrenches within
-/// reach.
+/// all is solved, some rounds at most; then the same with feet and joints, and where feet
+/// cannot be held with joints alone, which count only if they leave wrenches within reach.
 class DYNACOM_EXPORT MotionRepairer {
  public:
   /// @param robot  is copied; its root must be a free-flyer
