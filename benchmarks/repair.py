@@ -1,12 +1,15 @@
 """What repair makes of motions of other people: the tables of docs/repair.md, in Markdown.
 
-Clips are repaired by dynacom.repair, once with wrenches only, and once with feet and joints.
+Clips are repaired by dynacom.repair, once with wrenches only, and once with feet and joints;
+--feet tells how still and how high feet stand then, of these and of robots that lean.
 Motions whose forces were measured are repaired by repairMotion, wrenches only, with the contacts
 that were found in them, and analysed with the same; nothing is asked of frames that are unsure.
 """
 
 import argparse
+import resource
 import sys
+import tempfile
 import time
 from collections import Counter
 from pathlib import Path
@@ -75,6 +78,21 @@ def slide(found):
     return 100.0 * finding.frames / found.statistics.frames
 
 
+def solved(report):
+    """Which part of the judged frames is Solved, with nothing missing but rounding [%]."""
+    status = np.array([str(status) for status in report["status"]])
+    judged = ~np.asarray(report.examination.verdict.unsure)
+    return f"{100.0 * np.mean(status[judged] == 'Solved'):.1f}"
+
+
+def solved_written(report):
+    """The same of the file, read again."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / report.clip.path.name
+        report.write(path)
+        return solved(report.examine_written(report.read_again(path)))
+
+
 def cells(report):
     """Of a clip's repair."""
     made = report.repair
@@ -82,6 +100,8 @@ def cells(report):
     return [
         f"{share(made.missing_before, before):.0f}",
         f"{share(made.missing, after):.1f}",
+        solved(report.after),
+        solved_written(report),
         f"{slide(before):.1f}",
         f"{slide(after):.1f}",
         span(made.root, 1e3, 1),
@@ -108,6 +128,8 @@ def read_samples(data, names):
 REPAIRED = [
     "reach before [%]",
     "after [%]",
+    "Solved [%]",
+    "in the file [%]",
     "slides before [%]",
     "after [%]",
     "root [mm]",
@@ -131,6 +153,125 @@ def print_clips(data, names):
             mended = "wrenches" if balance_only else "all"
             before = report.repair.before.verdict.outcome
             print_row([name, before, mended, *cells(report), f"{spent:.0f}"])
+
+
+# ---- Feet ----
+
+# Frames so near to one in which a part of the foot touches down or lifts off are not inside.
+AROUND = 2
+
+
+def inside(active, stance):
+    """Frames of a stance around which the same parts of its foot carry: active is (T, parts)."""
+    frames = range(stance.first + AROUND, stance.behind - AROUND)
+    return [
+        frame
+        for frame in frames
+        if (active[frame - AROUND : frame + AROUND + 1] == active[frame]).all()
+    ]
+
+
+def measure_held(report):
+    """Speeds [mm/s] and heights over the ground [mm] of parts that carry inside stances that are
+    held still, by differences of two frames, and how many stances these are."""
+    found, stances = report.after.examination, report.repair.stances
+    held = [s for s in stances if s.is_still and s.contact < len(report.robot.contacts)]
+    active = np.asarray(found.inference.schedule.active)
+    time = found.derived.motion.time
+    parts = dynacom.splitContacts(report.robot.dynacom(), found.links)
+    ground = dynacom.findRepairGround(parts, found.inference, time)
+    speeds, heights = [], []
+    for stance in held:
+        own = [k for k, part in enumerate(found.parts) if part.contact == stance.contact]
+        for frame in inside(active[:, own], stance):
+            for part in np.array(own)[active[frame, own]]:
+                places = found.part_motions[part].position[frame - 1 : frame + 2]
+                step = (places[2] - places[0]) / (time[frame + 1] - time[frame - 1])
+                speeds.append(1e3 * np.linalg.norm(step - found.inference.ground_velocity))
+                heights.append(1e3 * (places[1, 2] - ground.height[frame, part]))
+    return len(held), np.array(speeds), np.array(heights)
+
+
+def largest_and_share(values, limit):
+    """The largest and which part is no larger than a limit [%]."""
+    return [f"{np.nanmax(values):.2g}", f"{100.0 * np.mean(values <= limit):.1f}"]
+
+
+def print_feet(data, names):
+    print_head(
+        ["motion", "outcome", "held", "largest speed [mm/s]", "≤ 3 mm/s [%]"]
+        + ["farthest from the ground [mm]", "≤ 1 mm [%]"]
+    )
+    for name, robot, clip in [*read_samples(data, names), *read_cases(data, names)]:
+        report = dynacom.repair(clip, robot, threads=1)
+        held, speeds, heights = measure_held(report)
+        count = report.summary["repair"]["stances"]["count"]
+        cells = ["", "", "", ""]
+        if len(speeds):
+            cells = largest_and_share(speeds, 3.0) + largest_and_share(np.abs(heights), 1.0)
+        print_row([name, report.outcome, f"{held} of {count}", *cells])
+
+
+def read_cases(data, names):
+    """Robots that lean, statically, with their names."""
+    robot = dynacom.load_robot("talos")
+    for name in ("lean_05cm", "fallonefoot_05cm", "tiptoe30_heel"):
+        if not names or any(part in name for part in names):
+            yield name, robot, dynacom.read_motion(data / "cases" / f"{name}.npz", robot)
+
+
+# ---- Growth with the length ----
+
+
+def back_and_forth(clip, times):
+    """The times and configurations of a clip that is played so often, every other time backward."""
+    q = np.concatenate([clip.q if turn % 2 == 0 else clip.q[::-1] for turn in range(times)])
+    return np.arange(len(q)) * np.diff(clip.time).mean(), q
+
+
+def largest_memory():
+    """Of this process so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def print_growth(data, names):
+    print_head(["clip", "frames", "minutes", "µs a frame", "memory [MB]", "a minute more [MB]"])
+    for name, robot, clip in read_samples(data, names or ["J_Dance0"]):
+        examiner = dynacom.MotionExaminer(robot.dynacom(), threads=1, sensitivity=False)
+        repairer = dynacom.MotionRepairer(robot.dynacom(), examiner)
+        earlier = None
+        for times in (1, 4, 16):
+            recorded = dynacom.RecordedMotion(*back_and_forth(clip, times))
+            start = time.process_time()
+            repairer.repair(recorded)
+            frames, minutes = len(recorded.time), recorded.time[-1] / 60.0
+            spent = 1e6 * (time.process_time() - start) / frames
+            memory = largest_memory()
+            more = "" if earlier is None else (memory - earlier[0]) / (minutes - earlier[1])
+            earlier = memory, minutes
+            cells = [str(frames), f"{minutes:.1f}", f"{spent:.0f}", f"{memory:.0f}"]
+            print_row([name, *cells, f"{more:.1f}" if more else ""])
+
+
+def print_filter(data, names):
+    """The centroidal filter alone, with contacts that are known, on one core."""
+    print_head(["clip", "frames", "iterations", "distance [mm]", "frames a second"])
+    for name, robot, clip in read_samples(data, names):
+        found = dynacom.analyze(clip, robot, sensitivity=False, threads=1).examination
+        parts = dynacom.splitContacts(robot.dynacom(), found.links)
+        dynamics = dynacom.analyzeMotion(
+            parts.robot, found.derived.motion, found.inference.schedule
+        )
+        seconds = []
+        for _ in range(5):
+            start = time.process_time()
+            change = dynacom.distanceToFeasible(
+                parts, found.part_motions, dynamics, found.inference.schedule, threads=1
+            )
+            seconds.append(time.process_time() - start)
+        frames = len(clip.time)
+        cells = [str(frames), str(change.iterations), f"{1e3 * change.rms:.1f}"]
+        print_row([name, *cells, f"{frames / np.median(seconds):.0f}"])
 
 
 # ---- Motions made from clips ----
@@ -216,11 +357,20 @@ def main():
     add("names", nargs="*", help="only what has one of these in its name")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--forces", action="store_true", help="motions with measured forces")
+    which.add_argument("--feet", action="store_true", help="how feet stand in repaired clips")
+    which.add_argument("--growth", action="store_true", help="time and memory of long motions")
+    which.add_argument("--filter", action="store_true", help="the centroidal filter alone")
     which.add_argument("--derived", action="store_true", help="motions made from clips")
     arguments = parser.parse_args()
     table = print_clips
     if arguments.forces:
         table = print_forces
+    elif arguments.feet:
+        table = print_feet
+    elif arguments.growth:
+        table = print_growth
+    elif arguments.filter:
+        table = print_filter
     elif arguments.derived:
         table = print_derived
     table(arguments.data, arguments.names)

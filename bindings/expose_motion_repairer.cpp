@@ -30,6 +30,11 @@ std::string writeReason(const RepairReason& reason) {
                           reason.text, "')");
 }
 
+std::string writeFeet(const RepairedFeet& feet) {
+  return internal::concat("RepairedFeet(speed=", feet.speed, ", drift=", feet.drift,
+                          ", sunk=", feet.sunk, ", floating=", feet.floating, ")");
+}
+
 std::string writeRepair(const MotionRepair& repair) {
   return internal::concat("MotionRepair(outcome='", to_string(repair.outcome),
                           "', frames=", repair.change.cols(), ", missing=", repair.missing, ")");
@@ -88,12 +93,24 @@ void exposeMotionRepairer() {
   bp::class_<RepairReason>("RepairReason", "Why a motion is not repaired.", bp::no_init)
       .def_readonly("code", &RepairReason::code,
                     "What is left: a fault's, or 'contact_needed', 'out_of_reach',\n"
-                    "'joint_limits', 'bound', 'not_better' or 'too_short'")
+                    "'joint_limits', 'feet_not_held', 'bound', 'not_better' or 'too_short'")
       .def_readonly("time", &RepairReason::time,
                     "Where it is worst [s]; NaN where it is of no frame")
       .def_readonly("text", &RepairReason::text, "In words")
       .def(PrintVisitor<RepairReason>(&writeReason))
       .def(CopyVisitor<RepairReason>());
+
+  bp::class_<RepairedFeet>("RepairedFeet", "How the contacts of a robot stand.", bp::no_init)
+      .def_readonly("speed", &RepairedFeet::speed,
+                    "The largest of one along the ground, that of foot_sliding [m/s]")
+      .def_readonly("drift", &RepairedFeet::drift,
+                    "The largest distance of a part that carries from where it is on average in "
+                    "its\nstance [m]; NaN where there is no stance")
+      .def_readonly("sunk", &RepairedFeet::sunk, "How deep a part is below its ground at most [m]")
+      .def_readonly("floating", &RepairedFeet::floating,
+                    "How high one that carries is above it at most [m]")
+      .def(PrintVisitor<RepairedFeet>(&writeFeet))
+      .def(CopyVisitor<RepairedFeet>());
 
   bp::class_<MotionRepair, std::shared_ptr<MotionRepair>>(
       "MotionRepair", "What was made of a recorded motion, see MotionRepairer.", bp::no_init)
@@ -117,6 +134,9 @@ void exposeMotionRepairer() {
                     "than 0.001 m g or m g m")
       .def_readonly("missing", &MotionRepair::missing, "In how many they cannot now")
       .add_property("stances", &getStances, "A RepairedStance for each, of the last rung")
+      .def_readonly("feet_before", &MotionRepair::feet_before,
+                    "The RepairedFeet of before, where what carries in after does")
+      .def_readonly("feet", &MotionRepair::feet, "The RepairedFeet of after")
       .def_readonly("ground_offset", &MotionRepair::ground_offset,
                     "By how much all of it was lifted, besides these changes [m]")
       .def_readonly("ground_tilt", &MotionRepair::ground_tilt,
@@ -135,8 +155,9 @@ void exposeMotionRepairer() {
       "climbed as far as they lead. Motions are filtered as for their verdict, and taken for "
       "exact\n"
       "from then on; wrenches are brought within reach by repairMotion, and contacts found once\n"
-      "more in what came out, until both agree; then the same with feet and joints, which counts\n"
-      "only if it leaves wrenches within reach. See docs/repair.md.",
+      "more in what came out, until all is solved, some rounds at most; then the same with\n"
+      "feet and joints, and where feet cannot be held with joints alone, which count only if they\n"
+      "leave wrenches within reach. See docs/repair.md.",
       bp::no_init)
       .def("__init__",
            bp::make_constructor(

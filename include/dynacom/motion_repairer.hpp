@@ -84,6 +84,17 @@ struct RepairChange {
   std::string joint;       ///< whose that is, of joints
 };
 
+/// How the contacts of a robot stand, of which stances tell when they carry.
+struct RepairedFeet {
+  double speed = 0.;  ///< the largest of one along the ground, that of FootSliding [m/s]
+  /// The largest distance of a part that carries from where it is on average in its stance [m]; NaN
+  /// where there is no stance.
+  double drift = 0.;
+  /// How deep a part is below its ground at most, and how high one that carries is above it, as
+  /// findRepairGround() tells it [m].
+  double sunk = 0., floating = 0.;
+};
+
 /// What was made of a recorded motion.
 struct MotionRepair {
   RepairOutcome outcome;
@@ -105,14 +116,18 @@ struct MotionRepair {
   /// m g m.
   Eigen::Index missing_before = 0, missing = 0;
   std::vector<RepairedStance> stances;  ///< of the last rung
-  double ground_offset = 0.;            ///< by which all was lifted, besides these changes [m]
-  double ground_tilt = 0.;              ///< by which it was turned before that [rad]
-  double stretch = 1.;                  ///< of time
+  /// In `before` and in `after`, where what carries in `after` does.
+  RepairedFeet feet_before, feet;
+  double ground_offset = 0.;  ///< by which all was lifted, besides these changes [m]
+  double ground_tilt = 0.;    ///< by which it was turned before that [rad]
+  double stretch = 1.;        ///< of time
   std::vector<RepairStep> steps;
   /// Of `Repaired` and `Feasible` none. Codes are those of faults, and `contact_needed` where
   /// nothing carries, `out_of_reach` where what carries cannot give what is needed,
-  /// `joint_limits`, `bound` where settings do not allow so much, `not_better` where all that was
-  /// tried is worse, and the motion stays as it was, and `too_short`.
+  /// `joint_limits`, `feet_not_held` where contacts were to stand still and drift by more than
+  /// RepairSettings::largest_drift in a stance, `bound` where settings do not allow so much,
+  /// `not_better` where all that was tried is worse, and the motion stays as it was, and
+  /// `too_short`.
   std::vector<RepairReason> reasons;
 };
 
@@ -122,8 +137,8 @@ struct MotionRepair {
 /// its verdict, and taken for exact from then on: contacts are found anew, unless that makes it
 /// much farther from a feasible one, as where soles are tilted by mistake. Then wrenches are
 /// brought within reach by repairMotion(), and contacts found once more in what came out, until
-/// both agree; then the same with feet and joints, which counts only if it leaves wrenches within
-/// reach.
+/// all is solved, some rounds at most; then the same with feet and joints, and where feet
+/// cannot be held with joints alone, which count only if they leave wrenches within reach.
 class DYNACOM_EXPORT MotionRepairer {
  public:
   /// @param robot  is copied; its root must be a free-flyer

@@ -24,33 +24,43 @@ _COLUMNS = (
     *("file", "clip", "status", "error", "verdict", "codes", "severity", "feasible_share"),
     *("frames", "duration"),
     *("mean_vertical_force", "residual_force_rms", "residual_torque_rms"),
-    *("distance_rms", "distance_max"),
+    *("distance_rms", "distance_max", "slope_x", "slope_y"),
     *("repair", "repair_root_max", "repair_reasons", "repair_file", "repair_error"),
     *(f"{code}.{column}" for code in FAULTS for column in ("holds", "frames", "worst")),
 )
 # A folder's ground is worth a word if it has so many clips, if theirs lie no farther apart than
-# this [m], and none nearer to zero.
+# this [m], and none nearer to zero; or are slopes whose gradients differ by no more in x and y, and
+# are this on average: one degree.
 _GROUND_CLIPS = 3
 _GROUND_SPREAD = 0.02
 _GROUND_HEIGHT = 0.01
+_SLOPE_SPREAD = 0.02
+_SLOPE = math.tan(math.radians(1.0))
 
 
 @dataclass(frozen=True)
 class Ground:
-    """On which the clips of a folder stand, one for all, which is not at zero."""
+    """On which the clips of a folder stand, one for all, which is not level, or not at zero."""
 
     #: Empty for all folders together.
     folder: str
     clips: int
-    #: [m]
+    #: [m]; of a slope, where contacts stand on it on average.
     height: float
+    #: Gradient (∂z/∂x, ∂z/∂y), zero where it is level.
+    slope: tuple[float, float] = (0.0, 0.0)
 
     def text(self) -> str:
         """A sentence."""
         where = f" in {self.folder}" if self.folder else ""
+        clips = f"The ground of all {self.clips} clips{where} whose ground is known"
+        if not any(self.slope):
+            return f"{clips} lies at {self.height:.2f} m."
+        angle = math.degrees(math.atan(math.hypot(*self.slope)))
+        towards = math.degrees(math.atan2(self.slope[1], self.slope[0]))
         return (
-            f"The ground of all {self.clips} clips{where} whose ground is known lies at "
-            f"{self.height:.2f} m."
+            f"{clips} is a slope of {angle:.1f} degrees, which rises towards {towards:.0f} degrees "
+            "from the x axis of the world: motions may be tilted."
         )
 
 
@@ -110,7 +120,7 @@ def overview(table: Path, listed: int = _LISTED) -> Overview:
     contacts = [name for name in file.schema_arrow.names if name.endswith(".ground")]
     if settings["options"]["detection"]["ground_height"] is not None:
         contacts = []  # it is where the user says
-    grounds: dict[str, _Heights] = {}
+    grounds: dict[str, _Grounds] = {}
     rows = _judged(file, contacts, found, grounds, listed)
     found.worst = heapq.nlargest(listed, rows, key=_badness)
     found.grounds = _find_grounds(grounds)
@@ -118,35 +128,42 @@ def overview(table: Path, listed: int = _LISTED) -> Overview:
 
 
 @dataclass
-class _Heights:
-    """Of the ground of a folder's clips [m]."""
+class _Grounds:
+    """Of a folder's clips: the least and the largest of their heights [m] and gradients."""
 
     clips: int = 0
-    lowest: float = math.inf
-    highest: float = -math.inf
+    lowest: tuple[float, ...] = (math.inf,) * 3
+    highest: tuple[float, ...] = (-math.inf,) * 3
 
-    def add(self, other: "_Heights") -> None:
+    def add(self, other: "_Grounds") -> None:
         self.clips += other.clips
-        self.lowest = min(self.lowest, other.lowest)
-        self.highest = max(self.highest, other.highest)
+        self.lowest = tuple(map(min, self.lowest, other.lowest))
+        self.highest = tuple(map(max, self.highest, other.highest))
 
     def ground(self, folder: str) -> Ground | None:
         """That of all, if it is worth a word."""
-        nearest = max(self.lowest, -self.highest)  # negative where they are on both sides of zero
-        is_one = self.highest - self.lowest <= _GROUND_SPREAD
-        if self.clips < _GROUND_CLIPS or not is_one or nearest < _GROUND_HEIGHT:
+        if self.clips < _GROUND_CLIPS:
             return None
-        return Ground(folder, self.clips, (self.lowest + self.highest) / 2.0)
+        pairs = list(zip(self.lowest, self.highest, strict=True))
+        spread, *slope_spreads = (high - low for low, high in pairs)
+        height, *slope = ((low + high) / 2.0 for low, high in pairs)
+        is_level = not any(self.lowest[1:]) and not any(self.highest[1:])
+        nearest = max(self.lowest[0], -self.highest[0])  # negative on both sides of zero
+        if is_level and spread <= _GROUND_SPREAD and nearest >= _GROUND_HEIGHT:
+            return Ground(folder, self.clips, height)
+        if max(slope_spreads) <= _SLOPE_SPREAD and math.hypot(*slope) >= _SLOPE:
+            return Ground(folder, self.clips, height, tuple(slope))
+        return None
 
 
-def _find_grounds(folders: dict[str, _Heights]) -> list[Ground]:
+def _find_grounds(folders: dict[str, _Grounds]) -> list[Ground]:
     """Of all clips together, or else of folders."""
-    together = _Heights()
-    for heights in folders.values():
-        together.add(heights)
+    together = _Grounds()
+    for grounds in folders.values():
+        together.add(grounds)
     if (ground := together.ground("")) is not None:
         return [ground]
-    found = (heights.ground(folder) for folder, heights in folders.items())
+    found = (grounds.ground(folder) for folder, grounds in folders.items())
     return [ground for ground in found if ground is not None]
 
 
@@ -154,7 +171,7 @@ def _judged(
     file: pyarrow.parquet.ParquetFile,
     contacts: list[str],
     found: Overview,
-    grounds: dict[str, _Heights],
+    grounds: dict[str, _Grounds],
     listed: int,
 ) -> Iterator[Row]:
     """The clips that were judged; all are counted on the way.
@@ -178,10 +195,10 @@ def _judged(
             _count_repair(row, found, listed)
             heights = [row[name] for name in contacts if row[name] is not None]
             if heights:
-                height = statistics.fmean(heights)
+                ground = (statistics.fmean(heights), row["slope_x"], row["slope_y"])
                 folder = row["file"].rpartition("/")[0]
-                own = _Heights(1, height, height)
-                grounds.setdefault(folder, _Heights()).add(own)
+                own = _Grounds(1, ground, ground)
+                grounds.setdefault(folder, _Grounds()).add(own)
             yield row
 
 

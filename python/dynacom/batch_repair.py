@@ -42,6 +42,7 @@ REASONS = {code: text for code, (_, text) in FAULTS.items()} | {
     "contact_needed": "nothing carries, where the motion needs a force",
     "out_of_reach": "contacts cannot give what the motion needs",
     "joint_limits": "joints are beyond their limits",
+    "feet_not_held": "contacts that were to stand still drift by more than they may",
     "not_better": "what was tried is worse, and the motion stays as it was",
     "bound": "the motion would have to be changed by more than the settings allow",
     "too_short": TOO_SHORT,

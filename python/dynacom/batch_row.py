@@ -62,6 +62,8 @@ _COLUMNS = (
     ("residual_torque_rms", "double", "m g m"),
     ("distance_rms", "double", "m"),
     ("distance_max", "double", "m"),
+    ("slope_x", "double", ""),
+    ("slope_y", "double", ""),
     ("solved_share", "double", ""),
     ("relaxed_share", "double", ""),
     ("no_contact_share", "double", ""),
@@ -280,6 +282,8 @@ def report_row(report: MotionReport, name: str) -> Row:
         for column, _, _ in _FAULT_COLUMNS:
             row[f"{code}.{column}"] = getattr(finding, column)
     grounds = ground_heights(found)
+    if any(map(math.isfinite, grounds.values())):
+        row["slope_x"], row["slope_y"] = map(float, found.inference.slope)
     for contact in statistics.contacts:
         for column, _, _ in _CONTACT_COLUMNS:
             value = grounds[contact.name] if column == "ground" else getattr(contact, column)

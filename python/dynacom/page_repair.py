@@ -175,8 +175,11 @@ def _changes(repair: Mapping[str, Any]) -> Iterator[Sequence[str]]:
         if not change:
             continue
         largest = _value_text(change.get("largest"), unit)
-        if change.get("joint"):
-            largest += f"<small>{escape(change['joint'])}</small>"
+        where = [change["joint"]] if change.get("joint") else []
+        if change.get("frame") is not None:
+            where.append(f"frame {change['frame']}")
+        if where:
+            largest += f"<small>{escape(', '.join(where))}</small>"
         yield title, _value_text(change.get("rms"), unit), largest, time_button(change.get("time"))
 
 

@@ -35,7 +35,7 @@ from dynacom.motion_report import (
 )
 from dynacom.motion_writer import write_motion
 from dynacom.repair_change import Before
-from dynacom.repair_summary import repair_summary
+from dynacom.repair_summary import left_notes, repair_summary
 from dynacom.results_folder import save_results
 from dynacom.robots import Robot, load_robot
 
@@ -75,7 +75,10 @@ class RepairReport:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The summary of `after`, with ``repair``, see docs/repair.md."""
-        return self.after.summary | {"repair": without_nan(repair_summary(self.robot, self.repair))}
+        summary = self.after.summary
+        repair = without_nan(repair_summary(self.robot, self.repair))
+        notes = [*summary["notes"], *left_notes(repair)]
+        return summary | {"notes": notes, "repair": repair}
 
     def write(self, path: str | Path) -> tuple[dict[str, Any], list[str]]:
         """Writes the motion in the format of the clip's file: as it was where nothing was changed.

@@ -10,6 +10,7 @@ from dynacom.dynacom_pywrap import (
     MotionExamination,
     MotionRepair,
     RepairChange,
+    RepairReason,
     RepairStep,
 )
 from dynacom.robots import Robot
@@ -23,9 +24,21 @@ _HINTS = {
     "bound": "time may be stretched (--stretch); ladder.largest_displacement and "
     "ladder.largest_turn say how much is allowed",
     "ground_penetration": "the height of the ground may be told (--ground-height)",
-    "joint_limits": "the joints may be in another order than the file's: see the notes",
+    "feet_not_held": "repair.largest_drift says up to which drift contacts are held; those that "
+    "drift farther make a step, or roll, which needs another motion",
     "discontinuity": "the clip may be cut there",
     "downward_normal": "the contacts of the robot's file may be turned",
+}
+
+# Joints that are no farther beyond their limits need no word [rad], [m].
+_NEAR_LIMITS = 1e-3
+
+#: What is told of contacts, before and after: as in RepairedFeet, what it is called, unit.
+FEET = {
+    "speed": ("Contacts slide by up to", "m/s"),
+    "drift": ("Contacts drift by up to", "m"),
+    "sunk": ("Contacts are below the ground by up to", "m"),
+    "floating": ("Contacts that carry are above it by up to", "m"),
 }
 
 #: Changes of the motion: key in the summary, what it is called, unit.
@@ -63,11 +76,22 @@ def repair_summary(robot: Robot, repair: MotionRepair) -> dict[str, Any]:
                 "code": reason.code,
                 "time": reason.time,
                 "text": reason.text,
-                "hint": _HINTS.get(reason.code),
+                "hint": _hint(reason, repair),
             }
             for reason in repair.reasons
         ],
     }
+
+
+def _hint(reason: RepairReason, repair: MotionRepair) -> str | None:
+    """What may help, if anything is known to."""
+    if reason.code != "joint_limits":
+        return _HINTS.get(reason.code)
+    if "joints" not in [step.rung for step in repair.steps]:
+        return "nobody asked for limits: without --balance-only, with repair.joints, they count"
+    if repair.joint_excess <= repair.joint_excess_before + _NEAR_LIMITS:
+        return "the joints may be in another order than the file's: see the notes"
+    return None
 
 
 def _missing(found: MotionExamination, frames: int) -> dict[str, Any]:
@@ -80,53 +104,33 @@ def _missing(found: MotionExamination, frames: int) -> dict[str, Any]:
 
 def _change(repair: MotionRepair, change: RepairChange) -> dict[str, Any]:
     time = float(repair.recorded.time[change.frame])
-    return {"rms": change.rms, "largest": change.largest, "time": time}
+    return {"rms": change.rms, "largest": change.largest, "frame": change.frame, "time": time}
+
+
+def left_notes(repair: Mapping[str, Any]) -> Iterator[str]:
+    """What is to be said of a motion that was left as it was, though joints are beyond limits.
+
+    Args:
+        repair: the entry.
+    """
+    excess = repair["limits"]["after"]
+    if repair["outcome"] == "feasible" and excess > _NEAR_LIMITS:
+        yield (
+            f"A joint is beyond its limits by up to {np.degrees(excess):.1f}°. The verdict does "
+            "not look at that: the motion is feasible, and was left as it is."
+        )
 
 
 # Stances.
 
 
 def _stances(robot: Robot, repair: MotionRepair) -> dict[str, Any]:
-    """Those of the last step, of the robot's contacts."""
+    """Those of the last step, of the robot's contacts, and how these stand."""
     stances = [stance for stance in repair.stances if stance.contact < len(robot.contacts)]
-    speeds = [_largest_speed(found) for found in (repair.before, repair.after)]
-    drifts = [
-        max((_drift(repair, found, stance) for stance in stances), default=None)
-        for found in (repair.before, repair.after)
-    ]
-    return {
-        "count": len(stances),
-        "held": sum(stance.is_still for stance in stances),
-        "largest_speed_before": speeds[0],
-        "largest_speed": speeds[1],
-        "largest_drift_before": drifts[0],
-        "largest_drift": drifts[1],
-    }
-
-
-def _largest_speed(found: MotionExamination) -> float:
-    """Of what is judged as ``foot_sliding`` [m/s]."""
-    return found.verdict.findings["foot_sliding"].worst
-
-
-def _drift(repair: MotionRepair, found: MotionExamination, stance: Any) -> float:
-    """The largest distance of a part that carries in a stance from where it is on average [m].
-
-    Which parts carry when is that of the motion after, before and after.
-    """
-    after = repair.after
-    frames = slice(stance.first, stance.behind)
-    carried = found.inference.ground_velocity * (found.derived.motion.time[frames, None])
-    active = np.asarray(after.inference.schedule.active)[frames]
-    largest = 0.0
-    for index, (part, motion) in enumerate(zip(after.parts, found.part_motions, strict=False)):
-        carries = active[:, index].astype(bool)
-        if part.contact != stance.contact or not carries.any():
-            continue
-        places = (motion.position[frames] - carried)[carries]
-        distances = np.linalg.norm(places - places.mean(axis=0), axis=1)
-        largest = max(largest, float(distances.max()))
-    return largest
+    found = {"count": len(stances), "held": sum(stance.is_still for stance in stances)}
+    for ending, feet in (("_before", repair.feet_before), ("", repair.feet)):
+        found |= {f"largest_{name}{ending}": getattr(feet, name) for name in FEET}
+    return found
 
 
 # Steps.
@@ -167,17 +171,20 @@ def _rung_texts(step: RepairStep, before: MotionExamination) -> Iterator[str]:
     elif step.rung == "feet":
         yield (
             "Contacts were to stand still, or slide slowly, level with their ground: they slide by "
-            f"up to {1e3 * step.after:.0f} mm/s, and did by {1e3 * step.before:.0f} mm/s."
+            f"up to {1e3 * step.after:.0f} mm/s, and by {1e3 * step.before:.0f} mm/s before."
         )
     elif step.rung == "joints":
         yield (
             "Joints were to keep within their limits: one is up to "
-            f"{np.degrees(step.after):.1f}° beyond, and was {np.degrees(step.before):.1f}°."
+            f"{np.degrees(step.after):.1f}° beyond, and was {np.degrees(step.before):.1f}° before."
         )
     else:
         yield f"Time was stretched by a factor of {step.after:g}."
     if not step.is_kept:
-        yield "That did not help: the motion stays as it was before this step."
+        yield (
+            "That does not count, since something else is worse then, or too much would have to be "
+            "changed: the motion stays as it was before this step."
+        )
 
 
 def _millimetres(value: float) -> str:
@@ -206,11 +213,8 @@ def compared_values(repair: Mapping[str, Any]) -> Iterator[tuple[str, str, Any, 
         ("Frames out of reach", "frames", "frames"),
     ):
         yield title, unit, before.get(key), after.get(key)
-    for title, key, unit in (
-        ("Contacts slide by up to", "largest_speed", "m/s"),
-        ("Contacts drift by up to", "largest_drift", "m"),
-    ):
-        yield title, unit, stances.get(f"{key}_before"), stances.get(key)
+    for name, (title, unit) in FEET.items():
+        yield title, unit, stances.get(f"largest_{name}_before"), stances.get(f"largest_{name}")
     if any(limits.values()):
         yield "Joints beyond limits by", "rad", limits.get("before"), limits.get("after")
 

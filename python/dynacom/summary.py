@@ -120,7 +120,7 @@ def repair_table(summary: dict[str, Any]) -> Table:
             title,
             f"{_value_text(change['rms'], unit)} (RMS), "
             f"up to {_value_text(change['largest'], unit)} "
-            f"({escape(what)}at {change['time']:.2f} s)",
+            f"({escape(what)}frame {change['frame']}, at {change['time']:.2f} s)",
         )
     for title, unit, value in moves(repair):
         table.add_row(title, f"by {_value_text(value, unit)}")

@@ -11,6 +11,7 @@
 #include "../check.hpp"
 #include "../motion_check.hpp"
 #include "../nan.hpp"
+#include "foot_measures.hpp"
 #include "joint_limits.hpp"
 #include "motion_linearization.hpp"
 
@@ -58,6 +59,9 @@ constexpr double kGiven = 1e-3;
 constexpr double kFarther = 1.5, kFartherBy = 0.003;
 // Joints that are no farther beyond their limits are within them: so much comes of rounding.
 constexpr double kWithinLimits = 1e-9;
+// Where limits are not looked after, so much counts as nothing [rad], [m]: a gripper that is at its
+// limit goes beyond it with any change.
+constexpr double kNearLimits = 1e-3;
 // A motion whose joints are accelerated so many times as much as before, and as one that is calm
 // [rad/s²], RMS, is worse.
 constexpr double kWilder = 3., kCalm = 3.;
@@ -66,21 +70,30 @@ constexpr double kSamePlace = 1e-3;
 // By which factors time is stretched.
 constexpr double kStretches[] = {1.1, 1.25, 1.5, 2., 3., 4.};
 
-bool isMissing(const MotionExamination& found, Index frame) {
+bool isSolved(const MotionExamination& found, Index frame) {
   const DistributionStatus status = found.analysis.status[static_cast<std::size_t>(frame)];
-  if (status == DistributionStatus::Solved || found.verdict.unsure[frame]) return false;
+  return status == DistributionStatus::Solved || found.verdict.unsure[frame];
+}
+
+bool isMissing(const MotionExamination& found, Index frame) {
+  if (isSolved(found, frame)) return false;
   return !(found.analysis.residual.col(frame).norm() <= kGiven * found.statistics.weight);
 }
 
-// Frames.
-std::vector<Index> listMissing(const MotionExamination& found) {
-  std::vector<Index> missing;
+Index countMissing(const MotionExamination& found) {
+  Index count = 0;
   for (Index frame = 0; frame < found.analysis.time.size(); ++frame)
-    if (isMissing(found, frame)) missing.push_back(frame);
-  return missing;
+    count += isMissing(found, frame);
+  return count;
 }
 
-Index countMissing(const MotionExamination& found) { return Index(listMissing(found).size()); }
+// Frames that are judged and not Solved, however little is missing.
+std::vector<Index> listUnsolved(const MotionExamination& found) {
+  std::vector<Index> unsolved;
+  for (Index frame = 0; frame < found.analysis.time.size(); ++frame)
+    if (!isSolved(found, frame)) unsolved.push_back(frame);
+  return unsolved;
+}
 
 // Turns a motion about the origin such that a slope becomes level.
 // @return  by how much [rad]
@@ -98,28 +111,33 @@ double level(const Eigen::Vector2d& slope, Eigen::MatrixXd& q) {
 
 // Of a motion, what counts against others.
 struct Standing {
-  Index missing;  // frames
-  double lack;    // of forces [m g] and moments [m g m], RMS
-  int rank;       // of its verdict, the higher the better
+  Index missing;   // frames
+  Index unsolved;  // frames in which anything is missing
+  double lack;     // of forces [m g] and moments [m g m], RMS
+  int rank;        // of its verdict, the higher the better
   bool is_carried;
-  double jolt;   // accelerations of joints, RMS
-  double slide;  // of contacts [m/s]
+  double jolt;    // accelerations of joints, RMS
+  double slide;   // of contacts [m/s]
+  double excess;  // of joints, see findLargestExcess()
 
   bool isFeasible() const { return rank == 2; }
 };
 
-Standing judge(const MotionExamination& found) {
+Standing judge(const pinocchio::Model& model, const MotionExamination& found) {
   const MotionStatistics& statistics = found.statistics;
   const auto joints = found.derived.motion.a.bottomRows(found.derived.motion.a.rows() - 6);
   const MotionOutcome outcome = found.verdict.outcome;
-  return {countMissing(found),
-          std::hypot(statistics.residual_force_rms, statistics.residual_torque_rms),
-          outcome == MotionOutcome::Feasible     ? 2
-          : outcome == MotionOutcome::Repairable ? 1
-                                                 : 0,
-          found.inference.schedule.active.any(),
-          joints.size() == 0 ? 0. : std::sqrt(joints.squaredNorm() / double(joints.size())),
-          found.verdict[MotionFault::FootSliding].worst};
+  return {
+      countMissing(found),
+      Index(listUnsolved(found).size()),
+      std::hypot(statistics.residual_force_rms, statistics.residual_torque_rms),
+      outcome == MotionOutcome::Feasible     ? 2
+      : outcome == MotionOutcome::Repairable ? 1
+                                             : 0,
+      found.inference.schedule.active.any(),
+      joints.size() == 0 ? 0. : std::sqrt(joints.squaredNorm() / double(joints.size())),
+      found.verdict[MotionFault::FootSliding].worst,
+      internal::findLargestExcess(model, found.derived.motion.time, found.derived.motion.q).size};
 }
 
 RepairChange summarize(const Eigen::RowVectorXd& sizes) {
@@ -192,7 +210,7 @@ class MotionRepairer::Workspace::Ladder {
   Ladder(const Workspace& workspace, const RecordedMotion& recorded, MotionExamination before)
       : workspace_(workspace), settings_(workspace.settings), recorded_(recorded) {
     found_.before = std::move(before);
-    before_ = judge(found_.before);
+    before_ = judge(model(), found_.before);
     found_.missing_before = before_.missing;
   }
 
@@ -209,6 +227,8 @@ class MotionRepairer::Workspace::Ladder {
           {"too_short", internal::kNaN, "there are too few frames whose accelerations are known"});
     }
     found_.joint_excess_before = found_.joint_excess = findExcess(recorded_.q);
+    found_.feet_before = found_.feet =
+        internal::measureFeet(found_.before, found_.before, found_.stances);
     return std::move(found_);
   }
 
@@ -220,7 +240,7 @@ class MotionRepairer::Workspace::Ladder {
     }
     const Contacts contacts = findContacts();
     std::optional<Attempt> best = balance(contacts);
-    if (settings_.repair.feet || settings_.repair.joints) standAndLimit(contacts, best);
+    standAndLimit(contacts, best);
     if (!best) return giveUp();
     finish(std::move(*best));
     return std::move(found_);
@@ -237,8 +257,9 @@ class MotionRepairer::Workspace::Ladder {
   struct Attempt {
     Eigen::MatrixXd q, change;
     std::vector<RepairedStance> stances;
+    std::vector<double> drifts;  // of these [m]
     Contacts contacts;
-    std::vector<Index> missing;  // frames
+    std::vector<Index> unsolved;  // frames
     Standing standing;
   };
 
@@ -286,25 +307,54 @@ class MotionRepairer::Workspace::Ladder {
     return attempt;
   }
 
-  // Feet and joints, if something is wrong with them, and no wrench is lost for it. Where balance
-  // alone has not led to where contacts are found again, feet that are level may.
+  // Feet and joints, as far as something is wrong with them: both at once, since legs that reach
+  // for a place may have to bend beyond their limits. Where feet cannot be held, joints alone.
   void standAndLimit(const Contacts& contacts, std::optional<Attempt>& best) {
-    const Eigen::MatrixXd& origin = found_.before.derived.motion.q;
-    const bool is_balanced = best && best->missing.empty();
-    const bool are_limits_wrong =
-        settings_.repair.joints && findExcess(best ? best->q : origin) > kWithinLimits;
-    const bool are_feet_wrong = settings_.repair.feet && !(best && best->standing.isFeasible());
+    const Standing below = best ? best->standing : before_;
+    const bool are_limits_wrong = settings_.repair.joints && below.excess > kWithinLimits;
+    const bool are_feet_wrong = settings_.repair.feet && !(best && best->standing.isFeasible() &&
+                                                           listSlipping(*best).empty());
     if (best && !are_limits_wrong && !are_feet_wrong) return;
-    Attempt attempt = is_balanced ? repeat(settings_.repair, best->contacts, best->q)
-                                  : repeat(settings_.repair, contacts, origin);
-    const bool is_kept =
-        isSmall(attempt.change) && !isWorse(attempt.standing, best ? best->standing : before_);
-    if (settings_.repair.feet)
-      found_.steps.push_back({RepairRung::Feet, before_.slide, attempt.standing.slide, is_kept});
-    if (settings_.repair.joints)
-      found_.steps.push_back(
-          {RepairRung::Joints, findExcess(origin), findExcess(attempt.q), is_kept});
+    if (settings_.repair.feet && goOn(settings_.repair, contacts, below, best)) return;
+    if (!settings_.repair.joints || (best && !are_limits_wrong)) return;
+    RepairSettings settings = settings_.repair;
+    settings.feet = false;
+    goOn(settings, contacts, below, best);
+  }
+
+  // From the rung below, if no wrench is lost for it, and joints that were to come nearer to their
+  // limits do.
+  // Where balance alone has not led to where contacts are found again, feet that are level may.
+  bool goOn(const RepairSettings& settings, const Contacts& contacts, const Standing& below,
+            std::optional<Attempt>& best) {
+    const bool is_balanced = best && below.missing == 0;
+    Attempt attempt = is_balanced ? repeat(settings, best->contacts, best->q)
+                                  : repeat(settings, contacts, found_.before.derived.motion.q);
+    const Standing found = attempt.standing;
+    const bool are_limits_better =
+        found.excess <= kWithinLimits || found.excess < below.excess - kWithinLimits;
+    const bool is_kept = isSmall(attempt.change) && !isWorse(found, below) &&
+                         (!settings.joints || are_limits_better);
+    if (settings.feet)
+      found_.steps.push_back({RepairRung::Feet, below.slide, found.slide, is_kept});
+    if (settings.joints && (is_kept || !settings.feet))
+      found_.steps.push_back({RepairRung::Joints, below.excess, found.excess, is_kept});
     if (is_kept) best = std::move(attempt);
+    return is_kept;
+  }
+
+  // Stances of contacts that drift by more than they may and be held.
+  std::vector<std::size_t> listSlipping(const Attempt& attempt) const {
+    std::vector<std::size_t> slipping;
+    for (std::size_t k = 0; k < attempt.stances.size(); ++k)
+      if (isOfContact(attempt.stances[k]) && attempt.drifts[k] > settings_.repair.largest_drift)
+        slipping.push_back(k);
+    return slipping;
+  }
+
+  // Not of another link.
+  bool isOfContact(const RepairedStance& stance) const {
+    return stance.contact < found_.before.contacts.size();
   }
 
   // Whether something is lost against another motion: wrenches, the verdict, all contacts, or what
@@ -333,7 +383,7 @@ class MotionRepairer::Workspace::Ladder {
     std::optional<Attempt> worse;  // the last, if it is
     for (int round = 1; round < settings_.rounds; ++round) {
       const Attempt& last = worse ? *worse : best;
-      if (last.missing.empty() && (!settings.feet || last.standing.isFeasible())) break;
+      if (last.unsolved.empty() && (!settings.feet || last.standing.isFeasible())) break;
       adopt(last, schedule);
       Attempt next = tryWith(settings, last.contacts, schedule, last.q, false);
       if (isBetter(next.standing, best.standing)) {
@@ -357,8 +407,11 @@ class MotionRepairer::Workspace::Ladder {
     RepairedMotion repaired = repairMotion(parts, found_.before.derived.motion, schedule, settings,
                                            {}, ground, start, is_new);
     const MotionExamination found = workspace_.exact.examine(write(repaired.motion.q));
-    return {std::move(repaired.motion.q),   std::move(repaired.change), std::move(repaired.stances),
-            {found.links, found.inference}, listMissing(found),         judge(found)};
+    std::vector<double> drifts = internal::measureDrifts(found, found, repaired.stances);
+    return {std::move(repaired.motion.q),   std::move(repaired.change),
+            std::move(repaired.stances),    std::move(drifts),
+            {found.links, found.inference}, listUnsolved(found),
+            judge(model(), found)};
   }
 
   // Takes contacts that were found around frames in which they cannot give what is needed; all of
@@ -371,7 +424,7 @@ class MotionRepairer::Workspace::Ladder {
       return;
     }
     const Index frames = schedule.active.cols();
-    for (const Index frame : found.missing) {
+    for (const Index frame : found.unsolved) {
       const Index first = std::max<Index>(frame - kAround, 0);
       const Index count = std::min(frame + kAround + 1, frames) - first;
       schedule.active.middleCols(first, count) = other.active.middleCols(first, count);
@@ -379,14 +432,16 @@ class MotionRepairer::Workspace::Ladder {
   }
 
   static bool isBetter(const Standing& one, const Standing& other) {
-    return one.missing != other.missing ? one.missing < other.missing : one.rank > other.rank;
+    if (one.missing != other.missing) return one.missing < other.missing;
+    return one.rank != other.rank ? one.rank > other.rank : one.unsolved < other.unsolved;
   }
 
   void finish(Attempt attempt) {
     found_.recorded = write(attempt.q);
     found_.after = workspace_.exact.examine(found_.recorded);
     found_.missing = attempt.standing.missing;
-    found_.stances = std::move(attempt.stances);
+    found_.feet_before = internal::measureFeet(found_.before, found_.after, attempt.stances);
+    found_.feet = internal::measureFeet(found_.after, found_.after, attempt.stances);
     found_.change = std::move(attempt.change);
     found_.root = summarize(found_.change.topRows<3>().colwise().norm());
     found_.joints = summarizeJoints(model(), found_.change);
@@ -399,6 +454,8 @@ class MotionRepairer::Workspace::Ladder {
     unmarked.is_exact = false;
     found_.filtered = workspace_.plain.examine(unmarked);
     explain();
+    explainFeet(attempt);
+    found_.stances = std::move(attempt.stances);
     found_.outcome = found_.reasons.empty() ? RepairOutcome::Repaired : RepairOutcome::NotRepaired;
   }
 
@@ -424,12 +481,9 @@ class MotionRepairer::Workspace::Ladder {
                             " rad")});
   }
 
-  // Also where nobody asked for them, but they were kept before.
+  // Also where nobody asked for them.
   void explainLimits() {
-    const double excess = found_.joint_excess;
-    if (!(excess > kWithinLimits) ||
-        (!settings_.repair.joints && !(excess > found_.joint_excess_before + kGiven)))
-      return;
+    if (!(found_.joint_excess > (settings_.repair.joints ? kWithinLimits : kNearLimits))) return;
     const internal::LargestExcess largest =
         internal::findLargestExcess(model(), recorded_.time, found_.recorded.q);
     const auto& joints = model().idx_vs;
@@ -437,7 +491,26 @@ class MotionRepairer::Workspace::Ladder {
     found_.reasons.push_back(
         {"joint_limits", recorded_.time[largest.frame],
          internal::concat(model().names[std::size_t(joint)], " is beyond its limits, by up to ",
-                          excess, " rad")});
+                          largest.size,
+                          internal::findSliding(model())[largest.v] ? " m" : " rad")});
+  }
+
+  // Contacts that were to stand still, and drift.
+  void explainFeet(const Attempt& attempt) {
+    if (!settings_.repair.feet) return;
+    const std::vector<std::size_t> slipping = listSlipping(attempt);
+    if (slipping.empty()) return;
+    const std::size_t worst = *std::max_element(
+        slipping.begin(), slipping.end(), [&](std::size_t one, std::size_t other) {
+          return attempt.drifts[one] < attempt.drifts[other];
+        });
+    const auto count =
+        std::count_if(attempt.stances.begin(), attempt.stances.end(),
+                      [&](const RepairedStance& stance) { return isOfContact(stance); });
+    found_.reasons.push_back(
+        {"feet_not_held", recorded_.time[attempt.stances[worst].first],
+         internal::concat("feet cannot be held in ", slipping.size(), " of ", count,
+                          " stances: they drift by up to ", attempt.drifts[worst], " m")});
   }
 
   // Frames whose wrench is still out of reach, where something carries, and where nothing does.

@@ -25,7 +25,7 @@ constexpr int kFarRounds = 5, kFarIterations = 8;
 // Then, costs count no more: the nearest motion within the cones, in which points and joints that
 // are held stay as they are, with larger penalties.
 constexpr double kPolish = 100., kPolishPlaces = 100.;
-constexpr int kPolishes = 8, kPolishIterations = 8;
+constexpr int kPolishes = 12, kPolishIterations = 8;
 // What is missing after that is rounding [m g, m g·m]: with more, distributions are not Solved.
 constexpr double kReached = 1e-10;
 // The polish ends where so many rounds in a row leave more than this part of what was missing
@@ -173,9 +173,11 @@ void WholeBodyWindow::polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q) {
   q.middleCols(first_, behind_ - first_) = best_q;
 }
 
-// Lets points and joints that are held be so where they are.
+// Lets points that are held be so where they are, and joints that are within their own limits.
 void WholeBodyWindow::stay() {
   for (Constraint& constraint : constraints_) constraint.off.setZero();
+  for (Pin& pin : pins_)
+    if (!(pin.own > 0.)) pin.off = 0.;
 }
 
 // The frames whose wrench depends on what is sought, and of which something is asked.
@@ -312,8 +314,9 @@ double WholeBodyWindow::pin(const Eigen::MatrixXd& q) {
         if (!isOfStep(kind) && !isSought(frame)) continue;
         const double off = measureExcess(joint, kind, problem_.time, q, frame);
         if (!(off > 0.)) continue;
-        pins_.push_back({frame, &joint, kind, off});
-        largest = std::max(largest, measureOwnExcess(joint, kind, problem_.time, q, frame));
+        const double own = measureOwnExcess(joint, kind, problem_.time, q, frame);
+        pins_.push_back({frame, &joint, kind, off, own});
+        largest = std::max(largest, own);
       }
   return largest;
 }
@@ -364,14 +367,20 @@ double WholeBodyWindow::weigh(const Constraint& constraint) const {
 }
 
 double WholeBodyWindow::weighChange(Index frame) const {
-  const bool is_end = frame == 0 || frame == problem_.time.size() - 1;
-  return differ(frame).duration * (problem_.pinned_ends && is_end ? kAnchor : 1.);
+  return differ(frame).duration * (problem_.pinned_ends && isEnd(frame) ? kAnchor : 1.);
+}
+
+// Of squares of how far points are from their places. Where the wrench at an end of the motion
+// depends on them, the root is at rest, and feet would have to move instead.
+double WholeBodyWindow::weighPlaces(Index frame) const {
+  const bool is_near_end = std::min(frame, problem_.time.size() - 1 - frame) <= kFarthest;
+  return differ(frame).duration * hold_ * (is_near_end ? kRest : 1.);
 }
 
 // Of squares of accelerations in a frame.
 Eigen::VectorXd WholeBodyWindow::weighAcceleration(Index frame) const {
   Eigen::VectorXd costs = differ(frame).duration * problem_.of_acceleration;
-  if (frame == 0 || frame == problem_.time.size() - 1) costs.head<6>() *= kRest;
+  if (isEnd(frame)) costs.head<6>() *= kRest;
   return costs;
 }
 
@@ -426,7 +435,7 @@ bool WholeBodyWindow::factorize(double penalty, double penalty_of_places) {
     if (constraint.off.size() > 0)
       block(frame, frame)
           .selfadjointView<Eigen::Lower>()
-          .rankUpdate(constraint.of_places.transpose(), differ(frame).duration * hold_);
+          .rankUpdate(constraint.of_places.transpose(), weighPlaces(frame));
     const double weight = weigh(constraint);
     const auto& terms = constraint.linear.terms;
     for (std::size_t i = 0; i < terms.size(); ++i)
@@ -465,7 +474,7 @@ void WholeBodyWindow::iterate(bool with_costs, Eigen::MatrixXd& change) {
     const Index frame = constraint.frame;
     if (constraint.off.size() > 0)
       step_.col(frame - first_).noalias() -=
-          differ(frame).duration * hold_ * constraint.of_places.transpose() * constraint.off;
+          weighPlaces(frame) * constraint.of_places.transpose() * constraint.off;
     const Vector6 off = weigh(constraint) * (constraint.moved - constraint.given + constraint.dual);
     for (const auto& term : constraint.linear.terms)
       if (isSought(term.frame))

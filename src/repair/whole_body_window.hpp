@@ -72,10 +72,14 @@ class WholeBodyWindow {
     const LimitedJoint* joint;
     LimitKind kind;
     double off;
+    double own;  // how far it is beyond its own limit; negative within
   };
 
   Difference differ(Eigen::Index frame) const;
   bool isSought(Eigen::Index frame) const { return first_ <= frame && frame < behind_; }
+  bool isEnd(Eigen::Index frame) const {  // of the motion
+    return frame == 0 || frame == problem_.time.size() - 1;
+  }
   void begin(Eigen::Index first, Eigen::Index behind, Eigen::Index asked);
   double linearize(const Eigen::MatrixXd& q);
   void place(Constraint& constraint);
@@ -98,6 +102,7 @@ class WholeBodyWindow {
   void apply(const Eigen::MatrixXd& change, Eigen::MatrixXd& q) const;
   double weigh(const Constraint& constraint) const;
   double weighChange(Eigen::Index frame) const;
+  double weighPlaces(Eigen::Index frame) const;
   Eigen::VectorXd weighAcceleration(Eigen::Index frame) const;
   const WholeBodyProblem& problem_;
   const RepairSettings& settings_;

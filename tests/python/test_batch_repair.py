@@ -14,6 +14,7 @@ import types
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pyarrow.parquet
 import pytest
 
@@ -628,3 +629,32 @@ def test_a_ground_that_is_not_at_zero(tmp_path):
     options = dynacom.AnalysisOptions()
     options.detection.ground_height = 0.1
     assert grounds(base / "high", tmp_path / "told", options=options) == []
+
+
+def test_a_folder_that_is_tilted(tmp_path):
+    folder = tmp_path / "tilted"
+    folder.mkdir()
+    tilt = np.radians(2.9)
+    with np.load(WALKS / "talos_walk.npz") as file:
+        time, q = file["t"][:200], file["q"][:200]
+    for number in range(3):
+        turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, tilt, 0.0), np.array([0.0, 0.0, 0.01 * number]))
+        tilted = q.copy()
+        for row in tilted:
+            row[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(row[:7]))
+        np.savez(folder / f"{number}.npz", t=time, q=tilted)
+    table = dynacom.batch(folder, "talos", out=tmp_path / "out")
+    # A turn about y by the angle lowers what is in front.
+    np.testing.assert_allclose(table["slope_x"].to_numpy(), -np.tan(tilt), atol=2e-3)
+    np.testing.assert_allclose(table["slope_y"].to_numpy(), 0.0, atol=2e-3)
+    (ground,) = overview(tmp_path / "out" / "clips.parquet").grounds
+    assert ground.text() in (tmp_path / "out" / "index.html").read_text()
+    assert ground.text().startswith(
+        "The ground of all 3 clips whose ground is known is a slope of 2.9 degrees, which rises "
+        "towards 180 degrees"
+    )
+    # A level one among them, and there is no common one.
+    np.savez(folder / "3.npz", t=time, q=q)
+    table = dynacom.batch(folder, "talos", out=tmp_path / "more")
+    assert table["slope_x"].to_pylist()[3] == 0.0
+    assert overview(tmp_path / "more" / "clips.parquet").grounds == []

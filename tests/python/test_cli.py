@@ -884,7 +884,7 @@ def test_repair(command, hurried, talos, tmp_path):
     root, joints = found["root"], found["joints"]
     assert rows["Root displaced"] == (
         f"{1e3 * root['rms']:.3g} mm (RMS), up to {1e3 * root['largest']:.3g} mm "
-        f"(at {root['time']:.2f} s)"
+        f"(frame {root['frame']}, at {root['time']:.2f} s)"
     )
     assert joints["joint"] in rows["Joints turned"] and "°" in rows["Joints turned"]
     assert rows["Stances held still"] == "8 of 8"

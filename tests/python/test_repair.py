@@ -6,6 +6,7 @@ import re
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +17,7 @@ import dynacom
 from batch_clips import write_without_legs
 from dynacom import AnalysisOptions, DynacomError, LadderSettings, RepairReport
 from dynacom.contacts_file import contact_arrays
+from dynacom.repair_summary import repair_summary
 from dynacom.robots import Robot
 from helpers import WALKS
 from motion_files import columns_of
@@ -127,6 +129,7 @@ def test_the_summary(hurried):
     assert repair["root"] == {
         "rms": pytest.approx(np.sqrt(np.mean(change**2))),
         "largest": pytest.approx(change.max()),
+        "frame": change.argmax(),
         "time": report.motion.time[change.argmax()],
     }
     shift = np.linalg.norm(report.after["com"] - report.before["com"], axis=1)
@@ -136,6 +139,10 @@ def test_the_summary(hurried):
     assert stances["held"] == stances["count"] == 8
     assert 0.0 < stances["largest_drift"] < 1e-3
     assert stances["largest_speed"] < stances["largest_speed_before"]
+    for name in ("speed", "drift", "sunk", "floating"):
+        assert stances[f"largest_{name}"] == getattr(found.feet, name)
+        assert stances[f"largest_{name}_before"] == getattr(found.feet_before, name)
+    assert max(stances["largest_sunk"], stances["largest_floating"]) < 2e-3
     assert [rung["name"] for rung in repair["rungs"]] == ["balance", "feet", "joints"]
     assert all(rung["kept"] and rung["text"].endswith(".") for rung in repair["rungs"])
     assert (repair["file"], repair["exact"]) == ("walk.npz", True)
@@ -227,6 +234,16 @@ def test_strict_mends_single_frames(talos, tmp_path):
     assert report.outcome == "repaired"
     assert report.repair.missing_before > 50 and report.repair.missing == 0
     assert set(report.after["status"]) == {"Solved"}
+
+
+def test_nothing_is_missing_but_rounding(anymal, tmp_path):
+    """Rounds go on until all frames are Solved, also those in which hardly anything is missing."""
+    with np.load(WALKS / "anymal_trot.npz") as file:
+        np.savez(tmp_path / "trot.npz", t=file["t"] / 3.0, q=file["q"])
+    report = dynacom.repair(tmp_path / "trot.npz", anymal)
+    unsure = np.asarray(report.after.examination.verdict.unsure)
+    assert np.count_nonzero(~unsure) > 100
+    assert {str(status) for status in report.after["status"][~unsure]} == {"Solved"}
 
 
 def test_what_repair_has_written_is_fine(talos, hurried):
@@ -354,6 +371,71 @@ def test_time_may_be_stretched(anymal, tmp_path):
     expected = 1.0 + stretch * (report.clip.time - 1.0)
     assert_allclose(again.clip.time, expected, rtol=0, atol=1e-12)
     assert again.verdict.outcome == "feasible"
+
+
+# Joints' limits.
+
+
+@pytest.fixture
+def beyond(talos, tmp_path) -> Path:
+    """The walk 1.9 times too fast, with a joint 0.3 rad beyond its limit."""
+    with np.load(WALKS / "talos_walk.npz") as file:
+        time, q = file["t"] / 1.9, file["q"]
+    model = talos.model
+    column = model.idx_qs[model.getJointId("head_2_joint")]
+    q[:, column] = model.upperPositionLimit[column] + 0.3
+    np.savez(tmp_path / "beyond.npz", t=time, q=q)
+    return tmp_path / "beyond.npz"
+
+
+def test_who_is_beyond_limits_is_not_repaired(talos, beyond, tmp_path):
+    """Nor who was so before, and did not ask for limits."""
+    report = dynacom.repair(beyond, talos, balance_only=True)
+    assert report.repair.missing == 0
+    repair = report.summary["repair"]
+    assert repair["limits"] == pytest.approx({"before": 0.3, "after": 0.3}, abs=1e-3)
+    assert (repair["outcome"], [reason["code"] for reason in repair["reasons"]]) == (
+        "not repaired",
+        ["joint_limits"],
+    )
+    assert repair["reasons"][0]["text"].startswith("head_2_joint is beyond its limits, by up to 0.")
+    assert "--balance-only" in repair["reasons"][0]["hint"]
+    report = dynacom.repair(beyond, talos)
+    assert report.outcome == "repaired"
+    assert report.summary["repair"]["limits"]["after"] < 1e-9
+
+
+def test_a_feasible_motion_beyond_limits(talos, beyond):
+    """Stays as it is, and is told of."""
+    with np.load(beyond) as file:
+        np.savez(beyond, t=1.9 * file["t"], q=file["q"])
+    report = dynacom.repair(beyond, talos)
+    assert (report.outcome, report.changed) == ("feasible", False)
+    assert "beyond its limits by up to 17.2°" in report.summary["notes"][-1]
+
+
+def test_the_order_of_joints_is_blamed_only_for_what_the_motion_has(talos, beyond):
+    options = AnalysisOptions()
+    options.ladder.largest_turn = 0.01  # which keeps the joint where it is
+    report = dynacom.repair(beyond, talos, options=options)
+    (reason,) = [
+        reason for reason in report.summary["repair"]["reasons"] if reason["code"] == "joint_limits"
+    ]
+    assert "another order" in reason["hint"]
+    worse = replace_excess(report.repair, before=0.0)
+    (reason,) = [
+        reason
+        for reason in repair_summary(talos, worse)["reasons"]
+        if reason["code"] == "joint_limits"
+    ]
+    assert reason["hint"] is None
+
+
+def replace_excess(repair: dynacom.MotionRepair, before: float) -> SimpleNamespace:
+    """The same, of a motion whose joints were that far beyond their limits."""
+    names = [name for name in dir(repair) if not name.startswith("_")]
+    values = {name: getattr(repair, name) for name in names}
+    return SimpleNamespace(**values | {"joint_excess_before": before})
 
 
 # Settings.
