@@ -22,16 +22,18 @@ constexpr int kCorrections = 3;
 constexpr int kTurningCorrections = 8;
 constexpr double kCorrected = 1e-14;
 // By how much a disc's direction may turn along a step, as 1 − cos, for its state to stay.
-constexpr double kTurning = 1e-4;
-// A residual that is more than ε over the mean compliance, times this, may expose what is held; of
-// that, the part from which on it does.
+constexpr double kTurning = 1e-6;
+// ε where discs are held, of an attempt after the first, as a part of the mean compliance.
+constexpr double kRefined = 1e-7;
+// From which residual on, over ε and times the mean compliance, it may be what holds discs, and
+// which response along the circle is that of one that is held by what it costs.
 constexpr double kResidual = 30.;
-constexpr double kExposing = 1e-2;
+constexpr double kHeldByCost = 0.02;
 // How often the residual is corrected where discs turn with it, at most, and until its change is
 // so small.
 constexpr int kTurns = 6;
 constexpr double kTurned = 1e-15;
-// The sine of the angle between what is exposed and the residual.
+// The sine of the angle between the direction of a disc and what the residual pulls at it with.
 constexpr double kParallel = 1e-9;
 
 inline Wrench difference(const Wrench& a, const Wrench& b) {
@@ -336,11 +338,44 @@ Mask DualNewton::takeStep(const Wrench& change, const Wrench& gradient, const La
 // step leads to those that belong to this state. Where discs are held, that does not follow from
 // the state, and it is over with the first.
 Mask DualNewton::search(const Lanes& first_slack, const Lanes& last_slack) {
-  Mask searching(true), found(false), is_fresh(true);
-  Lanes slack = first_slack;
   begin();
   Wrench gradient;  // of the dual
   for (int i = 0; i < 6; ++i) gradient[i] = -target_[i];
+  return descend(first_slack, last_slack, gradient, Mask(true), Mask(true));
+}
+
+// The same with a smaller ε from the multipliers at hand, where discs are held. Multipliers grow
+// along the residual then, by as much as is known of it.
+Mask DualNewton::refine(const Mask& found) {
+  const Lanes slack = kRefined * mean_compliance_;
+  const Mask refined = found && isHeld() && slack_ > slack;
+  if (stdx::none_of(refined)) return found;
+  expose();
+  findMissing();
+  const Lanes growth = select(refined, 1. / slack - 1. / slack_, 0.);
+  Wrench change;
+  Mask is_far(false);
+  for (const Cone& cone : cones_)
+    if (cone.is_there && cone.is_disc) is_far = is_far || cone.exposed > 0.;
+  for (int i = 0; i < 6; ++i) change[i] = select(is_far, growth * missing_[i], 0.);
+  startStep(change);
+  followStep(1.);
+  for (int i = 0; i < 6; ++i) multipliers_[i] += change[i];
+  sumUp();
+  const Lanes now = select(refined, slack, slack_);
+  Wrench gradient;
+  for (int i = 0; i < 6; ++i) gradient[i] = achieved_[i] + now * multipliers_[i] - target_[i];
+  const Mask is_found = descend(now, now, gradient, Mask(false), refined);
+  return (refined && is_found) || (!refined && found);
+}
+
+// @param gradient   of the dual
+// @param fresh      where the multipliers at hand are not those of the state
+// @param searching  where anything is sought
+Mask DualNewton::descend(const Lanes& first_slack, const Lanes& last_slack, Wrench gradient,
+                         const Mask& fresh, Mask searching) {
+  Mask found(false), is_fresh = fresh;
+  Lanes slack = first_slack;
   for (int step = 0; step < kMaximalSteps && stdx::any_of(searching); ++step) {
     assembleCompliance();
     Wrench change;
@@ -492,18 +527,16 @@ Mask DualNewton::reach(const Wrench& wrench) {
   return norm(difference(wrench, achieved_)) <= kMissing;
 }
 
-// Of the discs that are held, tells those that the residual holds, as far as that is known: ε ν.
-// They respond in no direction but its own.
+// Of the discs that are held, tells those that the residual holds, which is ε ν as far as that is
+// known: these are pulled at by 1/ε, and so hardly respond along their circle. They are to respond
+// along their direction only.
 void DualNewton::expose() {
   for (int i = 0; i < 6; ++i) missing_[i] = slack_ * multipliers_[i];
   const Lanes distance = norm(missing_);
   const Mask is_far = distance * mean_compliance_ > kResidual * slack_;
   for (Cone& cone : cones_) {
     if (!cone.is_there || !cone.is_disc) continue;
-    const Lanes x = dot(cone.e[0], missing_), y = dot(cone.e[1], missing_);
-    const Lanes square = dot(cone.e[0], cone.e[0]) + dot(cone.e[1], cone.e[1]);
-    const Mask exposed = is_far && cone.held > 0. &&
-                         x * x + y * y > kExposing * kExposing * distance * distance * square;
+    const Mask exposed = is_far && cone.held > 0. && cone.curve < kHeldByCost;
     cone.exposed = select(exposed, 1., 0.);
     stdx::where(exposed, cone.curve) = 0.;
   }
@@ -746,7 +779,8 @@ Mask DualNewton::solve(const Wrench& target, double spread, int attempt) {
       for (int i = 0; i < cone.size; ++i) mean_compliance_ += dot(cone.e[i], cone.e[i]) / 6.;
   const Mask found =
       search(kSlacks[attempt][0] * mean_compliance_, kSlacks[attempt][1] * mean_compliance_);
-  return found && finish(spread);
+  const Mask refined = attempt == 0 ? found : refine(found);
+  return refined && finish(spread);
 }
 
 }  // namespace dynacom::lanes

@@ -119,6 +119,9 @@ class DualNewton {
 
   void begin();
   Mask search(const Lanes& first_slack, const Lanes& last_slack);
+  Mask descend(const Lanes& first_slack, const Lanes& last_slack, Wrench gradient,
+               const Mask& fresh, Mask searching);
+  Mask refine(const Mask& found);
   Factors factorise(const Lanes& slack) const;
   Mask takeStep(const Wrench& change, const Wrench& gradient, const Lanes& slack,
                 const Mask& is_free, Mask& searching);
