@@ -10,6 +10,16 @@ namespace dynacom {
 
 using internal::kNaN;
 
+namespace {
+
+// A number that no contact has had, in any thread.
+std::uint64_t nextRevision() {
+  static std::atomic<std::uint64_t> revisions{0};
+  return ++revisions;
+}
+
+}  // namespace
+
 void ContactBase::updateNewtonEuler(const Eigen::Vector3d& com, const SE3& oMs) {
   pose_ = oMs;
   if (cols() == 0) return;
@@ -67,8 +77,7 @@ void ContactBase::setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
   reg_A_ = reg_A;
   reg_b_.setZero(cols());
   set_.reset();
-  static std::atomic<std::uint64_t> revisions{0};  // in all threads
-  revision_ = ++revisions;
+  revision_ = nextRevision();
   if (same_cols) return;
   ne_A_.setZero(6, cols());
   force_.setZero(cols());
@@ -90,6 +99,12 @@ void ContactBase::setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
   fri_b_ = fri_b;
   reg_b_ = reg_b;
   set_ = set;
+}
+
+void ContactBase::setWeights(const Eigen::Ref<const Eigen::VectorXd>& reg_A) {
+  internal::requireSize("reg_A", reg_A.size(), cols(), "components");
+  reg_A_ = reg_A;
+  revision_ = nextRevision();
 }
 
 void ContactBase::reset() {
