@@ -22,14 +22,15 @@ A robot file is YAML::
         # kind point only, optional
         world_aligned: true
         radius: 0.02
-    friction: cone            # optional: what motions are judged by where contacts are outer pyramids
+    friction: cone            # optional: by what motions are judged, see docs/verdict.md
     default:                  # optional: joints that are not zero where nothing is known of them
       left_elbow_joint: 0.5   #   [rad], or [m] where they slide
     joint_layouts:            # optional: joints of the robot's smaller versions, in their order
       - [left_hip_joint, left_knee_joint, right_hip_joint, right_knee_joint]
 
 The contacts' keys from ``mu`` on are the fields of ``Contact6DSettings`` and
-``ContactPointSettings``, and mean the same. The files in the package's folder ``robots`` are known by their names.
+``ContactPointSettings``, and mean the same. The files in the package's folder ``robots`` are known
+by their names.
 """
 
 import math
@@ -149,8 +150,8 @@ class Robot:
     #: Names of joints, in their order, of the robot's smaller versions: for motions that have fewer
     #: joints than the robot, and no names. No two are equally long.
     joint_layouts: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
-    #: What motions are judged by where a contact is an outer pyramid, as it is by default, and where
-    #: links touch something. Forces that are shared by :meth:`dynacom` know nothing of it.
+    #: By what motions are judged where a contact is an outer pyramid, as it is by default, and
+    #: where links touch something. What :meth:`dynacom` makes knows nothing of it.
     friction: FrictionModel = FrictionModel.Cone
 
     @cached_property
