@@ -54,6 +54,10 @@ constexpr int kSlowRounds = 4;
 // Of a direction that faces span, what remains outside of the others: more than the first, it is
 // one of its own, less than the second, it is rounding.
 constexpr double kIndependent = 1e-6, kDependent = 1e-11;
+// What faces that hardly span a direction may leave of the wrench: contacts on a line but for what
+// a model's numbers are off.
+constexpr double kHardlySpanned = 1e-9;
+constexpr int kCertainRounds = 6;  // after which that counts
 // Of the residual, a component that exposes a face.
 constexpr double kExposed = 1e-9;
 constexpr int kResidualSteps = 20;
@@ -256,9 +260,9 @@ struct DistributionSolver::Workspace {
   double enough() const { return std::max(may_lack, kRounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
-  bool relax(const Vector6& guess);
-  bool spanFaces(Matrix6& basis, int& rank, Vector6& fixed);
-  bool findResidual(Vector6& residual);
+  bool relax(const Vector6& guess, bool is_spanned_certainly);
+  bool spanFaces(bool is_certain, Matrix6& basis, int& rank, Vector6& fixed);
+  bool findResidual(bool is_certain, Vector6& residual);
   std::vector<Vector6> directions;
 };
 
@@ -429,7 +433,9 @@ DistributionStatus DistributionSolver::Workspace::search() {
     const bool stays = (lacking - former_missing).norm() <= 0.1 * size;
     if (size > kReach && (round == 0 || stays)) {
       const Vector6 kept = multipliers;
-      if (relax(lacking)) return DistributionStatus::Relaxed;
+      if (relax(lacking, true)) return DistributionStatus::Relaxed;
+      evaluate(kept, all);
+      if (round >= kCertainRounds && relax(lacking, false)) return DistributionStatus::Relaxed;
       evaluate(kept, all);
     }
     former_missing = lacking;
@@ -443,8 +449,9 @@ DistributionStatus DistributionSolver::Workspace::search() {
 }
 
 // An orthonormal basis of the wrenches that the faces span, and the wrench that all forces in them
-// share. Returns false if the rank is not certain.
-bool DistributionSolver::Workspace::spanFaces(Matrix6& basis, int& rank, Vector6& fixed) {
+// share. Returns false if the rank is not certain, and is to be.
+bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, int& rank,
+                                              Vector6& fixed) {
   directions.clear();
   fixed.setZero();
   for (const Block& block : blocks) {
@@ -453,14 +460,15 @@ bool DistributionSolver::Workspace::spanFaces(Matrix6& basis, int& rank, Vector6
     for (int k = 0; k < span.count; ++k)
       directions.push_back(weights.cwiseProduct(block.wrenchOf(span.axes.col(k))).normalized());
   }
-  return internal::findSpan(directions, kIndependent, kDependent, basis, rank);
+  return internal::findSpan(directions, kIndependent, is_certain ? kDependent : kIndependent, basis,
+                            rank);
 }
 
 // What is missing of the closest wrench, from the forces at hand and a guess: the part of the
 // target that the faces which forces are on do not span. Where these turn with the residual, by
 // Newton's method, whose Jacobian outside of what they span is 1 + Σ ∂(NE x)/∂r. Then the faces are
 // those that it exposes.
-bool DistributionSolver::Workspace::findResidual(Vector6& residual) {
+bool DistributionSolver::Workspace::findResidual(bool is_certain, Vector6& residual) {
   bool is_found = false;
   for (int step = 0; step < kResidualSteps && !is_found; ++step) {
     const Vector6 y = weights.cwiseProduct(residual);
@@ -474,7 +482,7 @@ bool DistributionSolver::Workspace::findResidual(Vector6& residual) {
     Matrix6 basis;
     int rank = 0;
     Vector6 fixed;
-    if (!spanFaces(basis, rank, fixed) || rank == 6) return false;
+    if (!spanFaces(is_certain, basis, rank, fixed) || rank == 6) return false;
     const auto spanned = basis.leftCols(rank);
     const Vector6 rest = target - fixed;
     const Vector6 former = residual;
@@ -510,9 +518,10 @@ bool DistributionSolver::Workspace::findResidual(Vector6& residual) {
 
 // Out of reach: the closest wrench, then the cheapest forces of those on the faces that its
 // residual exposes, and the proof of both.
-bool DistributionSolver::Workspace::relax(const Vector6& guess) {
+// @param is_spanned_certainly  whether a direction that faces hardly span is not to be left out
+bool DistributionSolver::Workspace::relax(const Vector6& guess, bool is_spanned_certainly) {
   Vector6 residual = guess;
-  if (!findResidual(residual)) return false;
+  if (!findResidual(is_spanned_certainly, residual)) return false;
   const Vector6 asked = target;
   target -= residual;
   const Vector6 start = multipliers - multipliers.dot(residual) / residual.squaredNorm() * residual;
@@ -532,17 +541,22 @@ bool DistributionSolver::Workspace::relax(const Vector6& guess) {
     former = size;
     centre = multipliers;
   }
-  const bool given = missing().norm() <= std::max(kMissing, enough());
+  const double left = is_spanned_certainly ? kMissing : kHardlySpanned;
+  const bool given = missing().norm() <= std::max(left, enough());
   may_lack = kMissing;
   target = asked;
   if (!given) return false;
+  if (!is_spanned_certainly) residual = missing();
   // No reachable wrench is closer: forces are as far in the direction of the residual as any.
   const double size = residual.norm();
   const Vector6 y = weights.cwiseProduct(residual);
   double gap = 0.;
   for (const Block& block : blocks) {
     const Vector6 pull = block.pullOf(y);
-    const double reach = block.inverse_weights.maxCoeff() * std::max(1., block.lever.norm());
+    // What does not decide faces has to be less than what a judge would take for a closer wrench.
+    const double reach = is_spanned_certainly
+                             ? block.inverse_weights.maxCoeff() * std::max(1., block.lever.norm())
+                             : 0.5 * block.inverse_weights[2];
     gap += std::max(
         0., block.set.support(pull, kExposed * size * reach) - pull.dot(block.response.force));
   }

@@ -1037,10 +1037,19 @@ def refuses(path, *parts, load=load_robot):
 @pytest.mark.parametrize(
     ("content", "parts"),
     [
-        ("", ["must be a mapping with the keys urdf, contacts, default, joint_layouts, got None"]),
+        (
+            "",
+            [
+                "must be a mapping with the keys urdf, contacts, friction, default",
+                "joint_layouts, got None",
+            ],
+        ),
         (
             "[1, 2]",
-            ["must be a mapping with the keys urdf, contacts, default, joint_layouts, got [1, 2]"],
+            [
+                "must be a mapping with the keys urdf, contacts, friction, default",
+                "joint_layouts, got [1, 2]",
+            ],
         ),
         ("a: [", ["must be YAML"]),
         ("a: !!python/object:os.system {}", ["must be YAML"]),
