@@ -57,7 +57,6 @@ constexpr double kIndependent = 1e-6, kDependent = 1e-11;
 // What faces that hardly span a direction may leave of the wrench: contacts on a line but for what
 // a model's numbers are off.
 constexpr double kHardlySpanned = 1e-9;
-constexpr int kCertainRounds = 6;  // after which that counts
 // Of the residual, a component that exposes a face.
 constexpr double kExposed = 1e-9;
 constexpr int kResidualSteps = 20;
@@ -435,7 +434,9 @@ DistributionStatus DistributionSolver::Workspace::search() {
       const Vector6 kept = multipliers;
       if (relax(lacking, true)) return DistributionStatus::Relaxed;
       evaluate(kept, all);
-      if (round >= kCertainRounds && relax(lacking, false)) return DistributionStatus::Relaxed;
+      // No smaller slack will tell them apart.
+      if (slack <= kLeastSlack * mean_compliance && relax(lacking, false))
+        return DistributionStatus::Relaxed;
       evaluate(kept, all);
     }
     former_missing = lacking;
