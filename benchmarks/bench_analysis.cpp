@@ -5,7 +5,8 @@
 //
 // One clip stands on two soles and sways, so that no inequality is active. The other, if there is
 // the file, is a recorded dance: in many of its frames the wrench is out of reach, where eiquadprog
-// has no answer, and in some no foot is on the ground, where it is not asked.
+// has no answer, and in some no foot is on the ground, where it is not asked. It is analysed with
+// the soles' corners in their place, too, as motions are judged: with pyramids and with cones.
 #include <malloc.h>
 
 #include <cmath>
@@ -72,7 +73,10 @@ Clip makeSway(Eigen::Index frames) {
   return clip;
 }
 
-Clip readDance() {
+// What of a sole carries.
+enum class Carried { Soles, Pyramids, Cones };
+
+Clip readDance(Carried carried) {
   std::ifstream file(DYNACOM_DANCE);
   std::vector<double> numbers;
   for (std::string line, number; std::getline(file, line);)
@@ -87,12 +91,17 @@ Clip readDance() {
       Eigen::VectorXd::LinSpaced(frames, 0., double(frames - 1) / kDanceRate);
   clip.motion =
       differentiate(model, time, filterConfigurations(model, q, kDanceRate, kDanceCutoff));
-  const PartRobot parts = splitContacts(clip.robot);
+  const PartRobot parts =
+      splitContacts(clip.robot, {},
+                    carried == Carried::Cones ? FrictionModel::Cone : FrictionModel::OuterPyramid);
   const ContactSchedule none{{}, ContactSchedule::Matrix(0, frames)};
   const ContactInference found =
       inferContacts(parts, computeContactMotions(parts.robot, clip.motion),
                     analyzeMotion(parts.robot, clip.motion, none), false);
-  clip.schedule = gatherParts(clip.robot, parts, found.schedule);
+  if (carried == Carried::Soles)
+    clip.schedule = gatherParts(clip.robot, parts, found.schedule);
+  else
+    clip = {parts.robot, clip.motion, found.schedule};
   return clip;
 }
 
@@ -177,13 +186,19 @@ Case examination(const std::string& name, int threads, const std::string& refere
   return {name, prepare, reference};
 }
 
-// In one thread, with each number of lanes that the machine has.
-void addClip(std::vector<Case>& cases, const std::string& name, const MakeClip& makeClip) {
-  const std::string reference = "Pinocchio and eiquadprog/" + name;
+std::string addReference(std::vector<Case>& cases, const std::string& name,
+                         const MakeClip& makeClip) {
+  std::string reference = "Pinocchio and eiquadprog/" + name;
   cases.push_back({reference, [makeClip] {
                      const auto all = std::make_shared<Reference>(makeClip());
                      return [all] { all->run(); };
                    }});
+  return reference;
+}
+
+// In one thread, with each number of lanes that the machine has.
+void addClip(std::vector<Case>& cases, const std::string& name, const MakeClip& makeClip,
+             const std::string& reference) {
   const std::pair<int, const char*> variants[] = {{8, "avx512"}, {4, "avx2"}, {1, "scalar"}};
   for (const auto& [lanes, variant] : variants)
     if (countLanes(makeG1(), lanes) == lanes)
@@ -199,8 +214,15 @@ std::vector<Case> makeCases() {
   mallopt(M_MMAP_THRESHOLD, 1 << 30);
   mallopt(M_TRIM_THRESHOLD, 1 << 30);
   std::vector<Case> cases;
-  addClip(cases, "sway", [] { return makeSway(kFrames); });
-  if (std::ifstream(DYNACOM_DANCE)) addClip(cases, "dance", readDance);
+  const MakeClip sway = [] { return makeSway(kFrames); };
+  addClip(cases, "sway", sway, addReference(cases, "sway", sway));
+  if (std::ifstream(DYNACOM_DANCE)) {
+    const auto dance = [](Carried carried) { return [=] { return readDance(carried); }; };
+    const std::string reference = addReference(cases, "dance", dance(Carried::Soles));
+    addClip(cases, "dance", dance(Carried::Soles), reference);
+    addClip(cases, "dance, corners", dance(Carried::Pyramids), reference);
+    addClip(cases, "dance, corners, cones", dance(Carried::Cones), reference);
+  }
   const MakeClip makeLong = [] { return makeSway(kManyFrames); };
   const int lanes = kMaximalLanes;
   const std::string one = "analyzeMotion/1 thread", two = "analyzeMotion/2 threads";

@@ -127,8 +127,8 @@ ContactInference infer(const PartRobot& parts, const bp::object& motions,
   return inferContacts(parts, own_motions, dynamics, exact, settings, known);
 }
 
-PartRobot split(const DynaCoM& robot, const bp::object& bodies) {
-  return splitContacts(robot, toVectorOf<BodyPoints>(bodies));
+PartRobot split(const DynaCoM& robot, const bp::object& bodies, FrictionModel friction) {
+  return splitContacts(robot, toVectorOf<BodyPoints>(bodies), friction);
 }
 
 MotionAnalysis gather(const DynaCoM& robot, const PartRobot& parts, const bp::object& contacts,
@@ -229,10 +229,12 @@ void exposeContactInference() {
       .def(CopyVisitor<ContactInference>());
 
   bp::def(
-      "splitContacts", &split, (bp::arg("robot"), bp::arg("bodies") = bp::list()),
+      "splitContacts", &split,
+      (bp::arg("robot"), bp::arg("bodies") = bp::list(), bp::arg("friction") = FrictionModel::Cone),
       "The PartRobot of a DynaCoM: a Contact6D becomes a point for each of its corners, called\n"
       "front_left, front_right, rear_left and rear_right; a ContactPoint stays what it is.\n"
-      "Links of BodyPoints follow, whose points are called body.<link>.<number>. Raises\n"
+      "Links of BodyPoints follow, whose points are called body.<link>.<number>. friction: of\n"
+      "links, and of contacts that are outer pyramids; others keep their own. Raises\n"
       "ValueError if a contact is of another kind, NotReadyError before initialize().");
   bp::def("gatherParts", &gather,
           (bp::arg("robot"), bp::arg("parts"), bp::arg("contacts"), bp::arg("motions"),

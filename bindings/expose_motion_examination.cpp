@@ -60,17 +60,13 @@ std::shared_ptr<MotionExaminer> makeExaminer(
     const DynaCoM& robot, Real cutoff, Truth flat_horizontal_ground, Real omega,
     const DetectionSettings& detection, const VerdictSettings& verdict, Truth sensitivity,
     const bp::object& progress, Integer threads, Integer lanes, const bp::object& bodies,
-    Truth distance, const CentroidalFilterSettings& filter) {
+    Truth distance, const CentroidalFilterSettings& filter, FrictionModel friction) {
   const AnalysisSettings analysis = {flat_horizontal_ground, omega, nullptr, threads, lanes};
-  const ExaminationSettings settings = {cutoff,
-                                        analysis,
-                                        detection,
-                                        verdict,
-                                        toVectorOf<BodyPoints>(bodies),
-                                        distance,
-                                        filter,
-                                        sensitivity,
-                                        toProgress<double>(progress)};
+  const ExaminationSettings settings = {cutoff,      analysis,
+                                        detection,   verdict,
+                                        friction,    toVectorOf<BodyPoints>(bodies),
+                                        distance,    filter,
+                                        sensitivity, toProgress<double>(progress)};
   return std::make_shared<MotionExaminer>(robot, settings);
 }
 
@@ -172,7 +168,8 @@ void exposeMotionExamination() {
                bp::arg("sensitivity") = defaults.sensitivity, bp::arg("progress") = bp::object(),
                bp::arg("threads") = defaults.analysis.threads,
                bp::arg("lanes") = defaults.analysis.lanes, bp::arg("bodies") = bp::list(),
-               bp::arg("distance") = defaults.distance, bp::arg("filter") = defaults.filter)),
+               bp::arg("distance") = defaults.distance, bp::arg("filter") = defaults.filter,
+               bp::arg("friction") = defaults.friction)),
           "cutoff: of the filter where derivatives have to be computed, 0 for none [Hz];\n"
           "sensitivity: whether to judge motions with half and twice the cut-off, too; progress:\n"
           "called now and then with what part of the frames is analysed; bodies: BodyPoints of\n"
@@ -180,7 +177,9 @@ void exposeMotionExamination() {
           "findCollisionPoints():\n"
           "dynacom.analyze gives them, and without them nobody kneels or lies; distance:\n"
           "whether to find how far motions are from feasible ones, by distanceToFeasible with the\n"
-          "settings of filter; the others as in the functions named above. Raises ValueError if "
+          "settings of filter; friction: FrictionModel of contacts that are outer pyramids, as\n"
+          "they are unless they say otherwise, and of links; the others as in the functions named "
+          "above. Raises ValueError if "
           "one is out of its range, NotReadyError\n"
           "before the robot's initialize().")
       .def("examine", &examine, (bp::arg("self"), bp::arg("recorded")),

@@ -89,13 +89,13 @@ void Contact6D::setGu(double gu) { change(&Contact6DSettings::gu, gu); }
 void Contact6D::setForceWeights(const Eigen::Vector3d& force_weights) {
   Vector6 weights = settings_.weights;
   weights.head<3>() = force_weights;
-  change(&Contact6DSettings::weights, weights);
+  changeWeights(weights);
 }
 
 void Contact6D::setTorqueWeights(const Eigen::Vector3d& torque_weights) {
   Vector6 weights = settings_.weights;
   weights.tail<3>() = torque_weights;
-  change(&Contact6DSettings::weights, weights);
+  changeWeights(weights);
 }
 
 void Contact6D::setSurfaceHalfWidth(double half_width) {
@@ -111,6 +111,12 @@ void Contact6D::change(Value Contact6DSettings::*field, const Value& value) {
   if (cols() == 0) throw NotReadyError("Contact6D is used before initialize()");
   internal::changeField(settings_, field, value);
   updateMatrices();
+}
+
+void Contact6D::changeWeights(const Vector6& weights) {
+  if (cols() == 0) throw NotReadyError("Contact6D is used before initialize()");
+  internal::changeField(settings_, &Contact6DSettings::weights, weights);
+  setWeights(settings_.weights);
 }
 
 void Contact6D::updateMatrices() {

@@ -10,6 +10,16 @@ namespace dynacom {
 
 using internal::kNaN;
 
+namespace {
+
+// A number that no contact has had, in any thread.
+std::uint64_t nextRevision() {
+  static std::atomic<std::uint64_t> revisions{0};
+  return ++revisions;
+}
+
+}  // namespace
+
 void ContactBase::updateNewtonEuler(const Eigen::Vector3d& com, const SE3& oMs) {
   pose_ = oMs;
   if (cols() == 0) return;
@@ -68,8 +78,7 @@ void ContactBase::setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
   reg_b_.setZero(cols());
   set_.reset();
   is_pyramid_ = true;
-  static std::atomic<std::uint64_t> revisions{0};  // in all threads
-  revision_ = ++revisions;
+  revision_ = nextRevision();
   if (same_cols) return;
   ne_A_.setZero(6, cols());
   force_.setZero(cols());
@@ -99,6 +108,12 @@ void ContactBase::setMatrices(const Eigen::Ref<const Eigen::MatrixXd>& uni_A,
   uni_b_ = uni_b;
   fri_b_ = fri_b;
   reg_b_ = reg_b;
+}
+
+void ContactBase::setWeights(const Eigen::Ref<const Eigen::VectorXd>& reg_A) {
+  internal::requireSize("reg_A", reg_A.size(), cols(), "components");
+  reg_A_ = reg_A;
+  revision_ = nextRevision();
 }
 
 void ContactBase::reset() {

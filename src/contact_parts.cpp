@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -86,10 +87,16 @@ class Limbs {
 // A contact as a whole, from the forces of its parts in one frame.
 class Gatherer {
  public:
-  Gatherer(const DynaCoM& robot, const std::string& name)
+  /// @param part  of one of its parts, whose friction is what it is judged by
+  Gatherer(const DynaCoM& robot, const std::string& name, const SurfaceOptions& part)
       : contact_(robot.getContact(name)->clone()),
         minimal_force_(robot.getMinimalVerticalForce()),
-        force_(Eigen::VectorXd::Zero(contact_->cols())) {}
+        force_(Eigen::VectorXd::Zero(contact_->cols())) {
+    if (auto* surface = dynamic_cast<Contact6D*>(contact_.get()))
+      judgeBy(part, *surface);
+    else if (auto* point = dynamic_cast<ContactPoint*>(contact_.get()))
+      judgeBy(part, *point);
+  }
 
   /// @param wrench  of its parts, about its origin, in its own axes
   /// @param force   in the axes that its parts have: the ground's, where they are a sole's
@@ -109,8 +116,17 @@ class Gatherer {
   }
 
  private:
+  template <class Contact>
+  static void judgeBy(const SurfaceOptions& part, Contact& contact) {
+    auto settings = contact.getSettings();
+    settings.friction = part.friction;
+    settings.facets = part.facets;
+    settings.facet_angle = part.facet_angle;
+    contact.initialize(settings);
+  }
+
   // Of a sole by the normal of the ground that its corners touch, which is not the sole's where
-  // that is tilted; the pyramid has the sole's axes.
+  // that is tilted; a pyramid has the sole's axes.
   double findFrictionUsage(const Eigen::Vector3d& force) const {
     const auto* surface = dynamic_cast<const Contact6D*>(contact_.get());
     const double own = contact_->getFrictionUsage();
@@ -118,7 +134,8 @@ class Gatherer {
       return force_[2] >= minimal_force_ || std::isnan(own) ? own : 0.;
     if (force.z() < minimal_force_) return 0.;
     const Eigen::Vector2d along = force_.head<2>();
-    const double part = along.isZero(0.) ? 1. : along.lpNorm<Eigen::Infinity>() / along.norm();
+    const double part =
+        along.isZero(0.) ? 1. : surface->getSettings().findTangential(along) / along.norm();
     return part * force.head<2>().norm() / (surface->getSettings().mu * force.z());
   }
   double findYawUsage(const Eigen::Vector3d& force) const {
@@ -176,8 +193,10 @@ ContactSchedule gather(const std::vector<PartRobot::Part>& parts, std::size_t fi
 }
 
 // As the public function of that name, for parts and bodies of whatever was split.
+// @param find_friction  of a part, by its number
 MotionAnalysis gather(const DynaCoM& robot, const std::vector<PartRobot::Part>& parts,
                       const std::vector<std::string>& links,
+                      const std::function<SurfaceOptions(std::size_t)>& find_friction,
                       const std::vector<ContactMotion>& contacts,
                       const std::vector<ContactMotion>& motions, MotionAnalysis analysis) {
   const std::vector<std::string> names = robot.getKnownContacts();
@@ -198,9 +217,14 @@ MotionAnalysis gather(const DynaCoM& robot, const std::vector<PartRobot::Part>& 
     bodies[k].force.setZero(3, frames);
     bodies[k].position.setZero(3, frames);
   }
-  for (const std::string& name : names) {
-    gathered.push_back(makeContact(name, frames));
-    gatherers.emplace_back(robot, name);
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    gathered.push_back(makeContact(names[k], frames));
+    const auto part = std::find_if(parts.begin(), parts.end(), [k](const PartRobot::Part& other) {
+      return other.contact == k;
+    });
+    if (part != parts.end())
+      gathered[k].friction = find_friction(std::size_t(part - parts.begin()));
+    gatherers.emplace_back(robot, names[k], gathered[k].friction);
   }
   const auto findRotation = [](const ContactMotion& moved, Eigen::Index frame) {
     return Eigen::Quaterniond(moved.rotation.col(frame)).toRotationMatrix();
@@ -383,14 +407,22 @@ PartRobot splitContacts(const DynaCoM& robot, const std::vector<BodyPoints>& bod
 MotionAnalysis gatherParts(const DynaCoM& robot, const PartRobot& parts,
                            const std::vector<ContactMotion>& contacts,
                            const std::vector<ContactMotion>& motions, MotionAnalysis analysis) {
-  return gather(robot, parts.parts, parts.bodies, contacts, motions, std::move(analysis));
+  const auto findFriction = [&](std::size_t part) -> SurfaceOptions {
+    return settingsOf(*parts.robot.getContact(parts.parts[part].name));
+  };
+  return gather(robot, parts.parts, parts.bodies, findFriction, contacts, motions,
+                std::move(analysis));
 }
 
 MotionAnalysis internal::gatherParts(const DynaCoM& robot, const ContactSplit& split,
                                      const std::vector<ContactMotion>& contacts,
                                      const std::vector<ContactMotion>& motions,
                                      MotionAnalysis analysis) {
-  return gather(robot, split.parts, split.bodies, contacts, motions, std::move(analysis));
+  const auto findFriction = [&](std::size_t part) -> SurfaceOptions {
+    return settingsOf(*split.carrier.contacts[part].contact);
+  };
+  return gather(robot, split.parts, split.bodies, findFriction, contacts, motions,
+                std::move(analysis));
 }
 
 ContactSchedule gatherParts(const DynaCoM& robot, const PartRobot& parts,

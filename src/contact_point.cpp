@@ -68,17 +68,20 @@ double ContactPoint::getFrictionUsage() const {
   return getUsage(settings_.findTangential(appliedForce().head<2>()), settings_.mu);
 }
 
-void ContactPoint::setMu(double mu) { change(&ContactPointSettings::mu, mu); }
+void ContactPoint::setMu(double mu) {
+  changeSettings(&ContactPointSettings::mu, mu);
+  updateMatrices();
+}
 
 void ContactPoint::setForceWeights(const Eigen::Vector3d& force_weights) {
-  change(&ContactPointSettings::weights, force_weights);
+  changeSettings(&ContactPointSettings::weights, force_weights);
+  setWeights(settings_.weights);
 }
 
 template <class Value>
-void ContactPoint::change(Value ContactPointSettings::*field, const Value& value) {
+void ContactPoint::changeSettings(Value ContactPointSettings::*field, const Value& value) {
   if (cols() == 0) throw NotReadyError("ContactPoint is used before initialize()");
   internal::changeField(settings_, field, value);
-  updateMatrices();
 }
 
 void ContactPoint::updateMatrices() {

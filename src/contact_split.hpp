@@ -23,7 +23,7 @@ struct ContactSplit {
 
 /// @throws as splitContacts()
 ContactSplit splitCarrier(const DynaCoM& robot, const std::vector<BodyPoints>& bodies = {},
-                          FrictionModel friction = FrictionModel::OuterPyramid);
+                          FrictionModel friction = FrictionModel::Cone);
 
 /// What a PartRobot has of one.
 ContactSplit describeSplit(const PartRobot& parts);

@@ -125,15 +125,42 @@ void write(const pinocchio::SE3& placement, double* numbers) {
   Vector3::Map(numbers + 9) = placement.translation();
 }
 
-// The contacts that lanes know: pyramids at their frames.
+// The contacts that lanes know: those at their frames without bounds and references.
 template <class Contact>
-const Contact* asPyramid(const ContactBase& contact) {
-  if (typeid(contact) != typeid(Contact) || !contact.isPyramid()) return nullptr;
+const Contact* asKnown(const ContactBase& contact) {
+  if (typeid(contact) != typeid(Contact) || contact.cols() == 0) return nullptr;
   const auto& known = static_cast<const Contact&>(contact);
-  return internal::isPlain(known.getSettings()) ? &known : nullptr;
+  const auto& settings = known.getSettings();
+  SurfaceOptions plain;
+  plain.friction = settings.friction;
+  plain.facets = settings.facets;
+  plain.facet_angle = settings.facet_angle;
+  return plain == settings && settings.reference.isZero(0.) ? &known : nullptr;
 }
-const Contact6D* asSurface(const ContactBase& contact) { return asPyramid<Contact6D>(contact); }
-const ContactPoint* asPoint(const ContactBase& contact) { return asPyramid<ContactPoint>(contact); }
+const Contact6D* asSurface(const ContactBase& contact) { return asKnown<Contact6D>(contact); }
+const ContactPoint* asPoint(const ContactBase& contact) { return asKnown<ContactPoint>(contact); }
+
+// Describes friction as lanes know it: as a pyramid of four sides, or as a disc. Returns whether it
+// is such.
+template <class Settings>
+bool describeFriction(const Settings& settings, lanes::Contact& description) {
+  double mu = settings.mu;
+  switch (settings.friction) {
+    case FrictionModel::OuterPyramid:
+      break;
+    case FrictionModel::InnerPyramid:
+      mu = getPyramidMu(settings, mu);
+      break;
+    case FrictionModel::Facets:
+      if (settings.facets != 4 || settings.facet_angle != 0.) return false;
+      break;
+    case FrictionModel::Cone:
+      description.is_disc = true;
+      if (settings.weights[0] != settings.weights[1]) return false;
+  }
+  description.betas[0] = description.betas[1] = mu;
+  return true;
+}
 
 bool isAligned(const ContactBase& contact) {
   const ContactPoint* point = asPoint(contact);
@@ -262,11 +289,12 @@ std::optional<LaneCarrier> LaneCarrier::make(const Carrier& carrier, int lanes) 
     weights.setOnes();
     description.size = static_cast<int>(contact.cols());
     weights.head(contact.cols()) = contact.reg_A();
+    if (!(surface ? describeFriction(surface->getSettings(), description)
+                  : describeFriction(point->getSettings(), description)))
+      return std::nullopt;
     if (surface) {
       const Contact6DSettings& settings = surface->getSettings();
-      betas << settings.mu, settings.mu, 0., settings.half_width, settings.half_length, settings.gu;
-    } else {
-      betas.head<2>().setConstant(point->getSettings().mu);
+      betas.tail<3>() << settings.half_width, settings.half_length, settings.gu;
     }
     made.contacts_.push_back(description);
     made.is_aligned_.push_back(isAligned(contact));

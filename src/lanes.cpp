@@ -532,8 +532,9 @@ void Distributor::writeContact(const Distributions& distributions, std::size_t k
     stdx::where(unloaded, part) = 0.;
     return part;
   };
-  storeWhere<1>(written, rows.friction_usage,
-                {usage(stdx::max(stdx::abs(f[0]), stdx::abs(f[1])), contact.betas[0])});
+  const Lanes tangential = contact.is_disc ? stdx::sqrt(f[0] * f[0] + f[1] * f[1])
+                                           : stdx::max(stdx::abs(f[0]), stdx::abs(f[1]));
+  storeWhere<1>(written, rows.friction_usage, {usage(tangential, contact.betas[0])});
   storeWhere<1>(written, rows.yaw_usage,
                 {usage(stdx::abs(f[5]), is_surface ? contact.betas[5] : 0.)});
 }

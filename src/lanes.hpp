@@ -69,10 +69,12 @@ struct Sweep {
                 // what was written there is nothing
 };
 
-/// A contact as a force, whose components are limited by |λᵢ| ≤ βᵢ λ_z.
+/// A contact as a force, whose components are limited by |λᵢ| ≤ βᵢ λ_z; or the first two together,
+/// where they have the same weight, by ‖(λ_x, λ_y)‖ ≤ β λ_z.
 struct Contact {
   int size;           // 3 or 6 components
-  double betas[6];    // the third is not used
+  bool is_disc;       // whether they are
+  double betas[6];    // the third is not used; of a disc, the first two are the same
   double weights[6];  // of the cost
 };
 
@@ -130,7 +132,7 @@ struct Interface {
   void (*destroy_distributor)(void* distributor);
 };
 
-constexpr int kVersion = 5;  // grows with each change to this file
+constexpr int kVersion = 6;  // grows with each change to this file
 constexpr char kEntry[] = "dynacom_lanes";
 using Entry = const Interface* (*)();
 

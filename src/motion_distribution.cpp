@@ -6,6 +6,7 @@
 
 #include "dynacom/contact6d.hpp"
 #include "dynacom/contact_point.hpp"
+#include "dynacom/contact_polygon.hpp"
 #include "nan.hpp"
 #include "standard_gravity.hpp"
 
@@ -28,6 +29,14 @@ double computeOmega(const Eigen::Matrix3Xd& com, double gravity, double ground_h
   return omega > 0. && std::isfinite(omega) ? omega : kNaN;
 }
 
+SurfaceOptions findOptions(const ContactBase& contact) {
+  if (const auto* point = dynamic_cast<const ContactPoint*>(&contact)) return point->getSettings();
+  if (const auto* surface = dynamic_cast<const Contact6D*>(&contact)) return surface->getSettings();
+  if (const auto* polygon = dynamic_cast<const ContactPolygon*>(&contact))
+    return polygon->getSettings();
+  return {};
+}
+
 // Makes room for all frames, in which nothing is written yet but what contacts are called, and when
 // they are active.
 void makeRoom(const Carrier& carrier, const ContactSchedule& schedule, MotionAnalysis& result) {
@@ -42,6 +51,7 @@ void makeRoom(const Carrier& carrier, const ContactSchedule& schedule, MotionAna
   for (std::size_t k = 0; k < carrier.contacts.size(); ++k) {
     MotionAnalysis::Contact& contact = result.contacts[k];
     contact.name = carrier.contacts[k].name;
+    contact.friction = findOptions(*carrier.contacts[k].contact);
     contact.active.setConstant(frames, false);
     for (std::size_t row = 0; row < schedule.names.size(); ++row)
       if (schedule.names[row] == contact.name)

@@ -236,7 +236,7 @@ struct MotionExaminer::Workspace {
       : robot(given),
         settings(given_settings),
         names(robot.getKnownContacts()),
-        split(internal::splitCarrier(robot)),
+        split(internal::splitCarrier(robot, {}, given_settings.friction)),
         data([this] { return std::make_unique<pinocchio::Data>(robot.getModel()); }),
         com_sweep(robot.getModel(), {}, given_settings.analysis.lanes, data),
         sweep(robot.getModel(), listAll(robot, split), given_settings.analysis.lanes, data),
@@ -373,7 +373,7 @@ class MotionExaminer::Workspace::Pipeline {
                                internal::ConeProjection::kMaximalPoints - count);
     if (bodies.empty()) return found;
 
-    links_.emplace(internal::splitCarrier(workspace_.robot, bodies));
+    links_.emplace(internal::splitCarrier(workspace_.robot, bodies, settings_.friction));
     const auto& points = links_->carrier.contacts;
     link_sweep_.emplace(
         model(),

@@ -129,12 +129,12 @@ bool MotionStatistics::mayBeLoad() const {
 Eigen::VectorXd computeConeUsage(const MotionAnalysis::Contact& contact) {
   internal::requireSize("wrench", contact.wrench.cols(), contact.friction_usage.size(),
                         "frames (as friction_usage)");
-  // Of the pyramid's usage, what the force's tangential part is longer than its larger component.
+  // Of a pyramid's usage, what the force's tangential part is longer than what that compares.
   Eigen::VectorXd usage = contact.friction_usage;
   for (Eigen::Index frame = 0; frame < usage.size(); ++frame) {
-    const auto tangential = contact.wrench.col(frame).head<2>();
-    const double larger = tangential.lpNorm<Eigen::Infinity>();
-    if (larger > 0.) usage[frame] *= tangential.norm() / larger;
+    const Eigen::Vector2d tangential = contact.wrench.col(frame).head<2>();
+    const double compared = contact.friction.findTangential(tangential);
+    if (compared > 0.) usage[frame] *= tangential.norm() / compared;
   }
   return usage;
 }

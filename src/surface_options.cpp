@@ -84,8 +84,6 @@ void validate(const SurfaceOptions& options, const char* settings) {
       "placement", "finite, its rotation orthonormal", options.placement);
 }
 
-bool isPlain(const SurfaceOptions& options) { return options == SurfaceOptions(); }
-
 bool isPyramid(const SurfaceOptions& options) {
   return (options.friction == FrictionModel::OuterPyramid ||
           options.friction == FrictionModel::InnerPyramid) &&

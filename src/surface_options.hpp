@@ -11,9 +11,6 @@ namespace dynacom::internal {
 /// @throws std::invalid_argument naming the first field out of its range
 void validate(const SurfaceOptions& options, const char* settings);
 
-/// Whether the contact is the manual's pyramid at its frame, without bounds.
-bool isPlain(const SurfaceOptions& options);
-
 /// Whether friction is a pyramid of four sides, and the normal force has no bounds.
 bool isPyramid(const SurfaceOptions& options);
 /// The friction coefficient of that pyramid.

@@ -26,6 +26,7 @@ struct ProblemContact {
   Eigen::Matrix3d rotation;
   Eigen::Vector3d lever;  ///< from the CoM [m]
   bool is_point = false;
+  bool is_cone = false;  ///< Coulomb's cone; else the pyramid around it
   double mu = 0., gu = 0., half_length = 0., half_width = 0.;
   Eigen::VectorXd weights;  ///< 3 or 6
 };

@@ -184,6 +184,28 @@ BOOST_AUTO_TEST_CASE(control_loop_allocates_nothing) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(weights_of_cones_change_without_allocating) {
+  ContactPointSettings of_point;
+  Contact6DSettings of_sole;
+  of_point.frame_name = of_sole.frame_name = "sole";
+  of_point.friction = of_sole.friction = FrictionModel::Cone;
+  ContactPoint point(of_point);
+  Contact6D sole(of_sole);
+  const Vector3d weights(1., 2., 3.), others(4., 5., 6.);
+  const auto revision = sole.getRevision();
+  BOOST_TEST(allocationsIn([&] {
+               point.setForceWeights(weights);
+               sole.setForceWeights(weights);
+               sole.setTorqueWeights(others);
+             }) == 0);
+  BOOST_TEST(point.reg_A() == weights);
+  Vector6 both;
+  both << weights, others;
+  BOOST_TEST(sole.reg_A() == both);
+  BOOST_TEST((point.getSet() && sole.getSet()));
+  BOOST_TEST(sole.getRevision() != revision);  // or nobody would look at it again
+}
+
 BOOST_AUTO_TEST_CASE(what_goes_wrong_in_the_world_allocates_nothing) {
   for (const auto feet : kAllFeet) {
     Standing standing(feet);

@@ -51,6 +51,22 @@ struct Walker {
 
 }  // namespace
 
+BOOST_AUTO_TEST_CASE(parts_have_the_cone_unless_their_contact_or_a_caller_says_otherwise) {
+  const Walker walker(1);
+  const auto frictionOf = [](const PartRobot& split) {
+    std::set<FrictionModel> found;
+    for (const PartRobot::Part& part : split.parts)
+      found.insert(std::dynamic_pointer_cast<const ContactPoint>(split.robot.getContact(part.name))
+                       ->getSettings()
+                       .friction);
+    return found;
+  };
+  using Models = std::set<FrictionModel>;
+  BOOST_TEST((frictionOf(splitContacts(*walker.robot)) == Models{FrictionModel::Cone}));
+  BOOST_TEST((frictionOf(splitContacts(*walker.robot, {}, FrictionModel::OuterPyramid)) ==
+              Models{FrictionModel::OuterPyramid}));
+}
+
 BOOST_AUTO_TEST_CASE(a_sole_is_its_corners_and_a_point_is_itself) {
   const Walker walker(1);
   const PartRobot split = splitContacts(*walker.robot);

@@ -12,6 +12,7 @@
 #include "problem_checker.hpp"
 #include "random_problems.hpp"
 #include "random_robot.hpp"
+#include "set_problems.hpp"
 
 using namespace dynacom;
 using namespace dynacom_tests;
@@ -129,6 +130,7 @@ class Stand {
       settings.mu = contact.mu;
       settings.weights = contact.weights;
       settings.frame_name = frame;
+      if (contact.is_cone) settings.friction = FrictionModel::Cone;
       robot_.addContact(std::make_shared<ContactPoint>(settings), name);
     } else {
       Contact6DSettings settings;
@@ -138,6 +140,7 @@ class Stand {
       settings.half_width = contact.half_width;
       settings.weights = contact.weights;
       settings.frame_name = frame;
+      if (contact.is_cone) settings.friction = FrictionModel::Cone;
       robot_.addContact(std::make_shared<Contact6D>(settings), name);
     }
   }
@@ -158,7 +161,7 @@ std::vector<int> findLanes(const DynaCoM& robot) {
 }
 
 struct Tally {
-  long solved = 0, relaxed = 0;
+  long solved = 0, relaxed = 0, failed = 0;
   long bound = 0;     // frames in which an inequality is active
   long in_lanes = 0;  // those of them that differ from one frame at a time: lanes round otherwise
 };
@@ -184,6 +187,108 @@ void check(const Stand& stand, Tally& tally) {
                                           [](const auto& contact) { return contact.active.any(); });
         tally.bound += is_bound;
         tally.in_lanes += is_bound && actual.forces() != expected.forces();
+      }
+    }
+  }
+}
+
+/// A contact as the judge of sets knows it.
+SetContact describe(const ProblemContact& contact) {
+  const auto corners = [](double x, double y) {
+    const Eigen::Vector2d half(x, y);
+    Eigen::Matrix2Xd vertices(2, 4);
+    vertices << x, -x, -x, x, y, y, -y, -y;
+    if (x > 0. && y > 0.) return vertices;
+    vertices.conservativeResize(2, half.isZero(0.) ? 1 : 2);
+    vertices.col(0) = half;
+    if (!half.isZero(0.)) vertices.col(1) = -half;
+    return vertices;
+  };
+  SetContact set;
+  set.size = contact.is_point ? 3 : 6;
+  if (contact.is_cone) set.radius = contact.mu;
+  set.friction = corners(contact.mu, contact.mu);
+  set.places = corners(contact.half_length, contact.half_width);
+  set.gamma = contact.gu;
+  set.rotation = contact.rotation;
+  set.lever = contact.lever;
+  set.weights = contact.weights;
+  set.reference = VectorXd::Zero(set.size);
+  return set;
+}
+
+SetProblem describe(const Problem& problem) {
+  SetProblem sets;
+  for (const ProblemContact& contact : problem.contacts) {
+    sets.contacts.push_back(describe(contact));
+    sets.problem.contacts.push_back(sets.contacts.back().make());
+  }
+  sets.problem.wrench = problem.wrench;
+  sets.problem.wrench_weights = problem.wrench_weights;
+  sets.problem.minimal_scale = problem.minimal_scale / problem.wrench_weights.head<3>().maxCoeff();
+  return sets;
+}
+
+/// Whether a force is on the boundary of its set, but for a part of a unit.
+bool isOnBoundary(const ProblemContact& contact, const VectorXd& force, double unit) {
+  const double normal = force[2], along = contact.is_cone
+                                              ? force.head<2>().norm()
+                                              : force.head<2>().lpNorm<Eigen::Infinity>();
+  double slack = std::min(normal, contact.mu * normal - along);
+  if (!contact.is_point)
+    slack = std::min({slack, contact.half_width * normal - std::abs(force[3]),
+                      contact.half_length * normal - std::abs(force[4]),
+                      contact.gu * normal - std::abs(force[5])});
+  return slack < 1e-9 * unit;
+}
+
+/// Checks the forces of all frames where some contacts are cones. Where these are at their limit,
+/// forces move with the square root of what wrenches are off: wrenches and costs are compared, with
+/// those of a DistributionSolver, which has no answer to some, as far as a judge certifies it.
+void checkCones(const Stand& stand, Tally& tally) {
+  const MotionAnalysis alone = stand.analyze(1);
+  for (const int lanes : findLanes(stand.robot())) {
+    const MotionAnalysis analysis = stand.analyze(lanes);
+    for (Index frame = 0; frame < stand.frames(); ++frame) {
+      BOOST_TEST_CONTEXT(lanes << " lanes, frame " << frame) {
+        const Problem problem = stand.problem(analysis, frame);
+        const SetProblem sets = describe(problem);
+        DistributionSolver solver;
+        const DistributionSolution expected = solver.solve(sets.problem);
+        DistributionSolution actual = expected;
+        actual.status = analysis.status[static_cast<std::size_t>(frame)];
+        actual.residual = analysis.residual.col(frame);
+        actual.achieved = problem.wrench - actual.residual;
+        const double unit = sets.problem.scale() / problem.wrench_weights.maxCoeff();
+        bool is_bound = false, differs = false;
+        double cost = 0.;
+        std::size_t next = 0;
+        for (std::size_t k = 0; k < analysis.contacts.size(); ++k) {
+          if (!analysis.contacts[k].active[frame]) continue;
+          const ProblemContact& contact = problem.contacts[next];
+          VectorXd& force = actual.forces[next++];
+          const auto own = [&](const MotionAnalysis& found) {
+            return found.contacts[k].wrench.col(frame).head(force.size());
+          };
+          force = own(analysis);
+          cost += 0.5 * contact.weights.cwiseProduct(force).squaredNorm();
+          is_bound = is_bound || isOnBoundary(contact, force, unit);
+          differs = differs || force != own(alone);
+        }
+        const bool is_answered = actual.status != DistributionStatus::NumericalFailure;
+        tally.failed += !is_answered;
+        tally.solved += actual.status == DistributionStatus::Solved;
+        tally.relaxed += actual.status == DistributionStatus::Relaxed;
+        tally.bound += is_bound;
+        tally.in_lanes += is_answered && is_bound && differs;
+        if (!is_answered) continue;
+        const SetVerdict verdict = dynacom_tests::check(sets, actual);
+        BOOST_TEST(verdict.outside < 1e-9);
+        BOOST_TEST(verdict.distance_gap < 1e-8);
+        if (dynacom_tests::check(sets, expected).error != "") continue;
+        BOOST_TEST(actual.status == expected.status);
+        BOOST_TEST(close(actual.residual / unit, expected.residual / unit, 1e-9));
+        BOOST_TEST(std::abs(cost - expected.cost) <= 1e-6 * expected.cost);
       }
     }
   }
@@ -238,6 +343,11 @@ std::vector<ProblemContact> makeCorners() {
     for (const double x : {-0.1, 0.1})
       for (const double y : {-0.04, 0.04}) corners.push_back(makePoint({x, foot + y, -0.7}));
   return corners;
+}
+
+std::vector<ProblemContact> makeCones(std::vector<ProblemContact> contacts) {
+  for (ProblemContact& contact : contacts) contact.is_cone = true;
+  return contacts;
 }
 
 }  // namespace
@@ -300,6 +410,70 @@ BOOST_AUTO_TEST_CASE(contacts_of_each_kind_are_shared_in_lanes) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(forces_in_cones_are_those_of_one_frame_at_a_time) {
+  ProblemGenerator generator(311);
+  Random random(312);
+  Tally tally;
+  int problems = 0;
+  while (problems < 500) {
+    Problem problem = generator.next();
+    if (problem.nearly_parallel || problem.weights_far_apart) continue;
+    for (ProblemContact& contact : problem.contacts) {
+      contact.is_cone = contact.mu > 0.;
+      contact.weights[1] = contact.weights[0];
+    }
+    BOOST_TEST_CONTEXT("problem " << problems++)
+    checkCones(Stand(problem, makeWrenches(problem.wrench, random, 13), random), tally);
+  }
+  if (tally.solved + tally.relaxed == 0) return;  // a machine without lanes
+  BOOST_TEST(tally.solved > 1000);
+  BOOST_TEST(tally.relaxed > 5000);
+  BOOST_TEST(tally.failed < 0.005 * (tally.solved + tally.relaxed));
+  BOOST_TEST(tally.in_lanes > 0.9 * tally.bound);
+}
+
+BOOST_AUTO_TEST_CASE(contacts_of_each_kind_with_cones_are_shared_in_lanes) {
+  const Vector3d left(0., 0.12, -0.7), right(0., -0.12, -0.7), along(0.1, 0., 0.);
+  std::vector<ProblemContact> slopes = makeCorners(), mixed = makeCorners();
+  for (ProblemContact& corner : slopes)
+    corner.rotation = Eigen::AngleAxisd(0.3, Vector3d(1., 2., 0.).normalized()).matrix();
+  for (ProblemContact& corner : mixed) corner.is_cone = corner.lever.y() > 0.;
+  const std::map<std::string, std::vector<ProblemContact>> sorts = {
+      {"corners of two soles", makeCones(makeCorners())},
+      {"corners on a slope", makeCones(slopes)},
+      {"a point", makeCones({makePoint(left)})},
+      {"two points", makeCones({makePoint(left), makePoint(right)})},
+      {"points on an edge", makeCones({makePoint(left - along), makePoint(left),
+                                       makePoint(left + along), makePoint(left + 2. * along)})},
+      {"a sole", makeCones({makeSole(left)})},
+      {"two soles", makeCones({makeSole(left), makeSole(right)})},
+      {"a sole and a point", makeCones({makeSole(right), makePoint(left)})},
+      {"pyramids and cones", mixed},
+  };
+  for (const auto& [name, contacts] : sorts) BOOST_TEST_CONTEXT(name) {
+      Random random(313);
+      Tally tally;
+      for (const bool all_active : {true, false}) {
+        const Problem problem = makeProblem(contacts);
+        checkCones(Stand(problem, makeWrenches(problem.wrench, random, 101), random, all_active),
+                   tally);
+      }
+      if (tally.solved + tally.relaxed == 0) return;  // a machine without lanes
+      BOOST_TEST(tally.relaxed > 20);
+      // A point alone gives most by its normal force, which may round alike.
+      BOOST_TEST(tally.in_lanes > (name == "a point" ? 0.5 : 0.95) * tally.bound);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(cones_with_unequal_weights_are_left_to_one_frame_at_a_time) {
+  Problem problem = makeProblem(makeCones(makeCorners()));
+  for (ProblemContact& contact : problem.contacts) contact.weights << 1., 2., 1.;
+  Random random(314);
+  Tally tally;
+  checkCones(Stand(problem, makeWrenches(problem.wrench, random, 21), random, true), tally);
+  BOOST_TEST(tally.failed == 0);
+}
+
 BOOST_AUTO_TEST_CASE(a_foot_that_is_all_but_level_tips_over_its_side_in_lanes) {
   // Its other side is pulled sideways by less than counts, and by more than rounding.
   std::vector<ProblemContact> corners = makeCorners();
@@ -339,6 +513,9 @@ BOOST_AUTO_TEST_CASE(a_frame_has_the_forces_that_it_has_alone) {
       {"corners of two soles", makeCorners()},
       {"points", {makePoint(left), makePoint(right), makePoint(behind)}},
       {"soles and a point", {makeSole(left), makeSole(right), makePoint(behind, 0.)}},
+      {"corners with cones", makeCones(makeCorners())},
+      {"soles and a point with cones",
+       makeCones({makeSole(left), makeSole(right), makePoint(behind, 0.3)})},
   };
   for (const auto& [name, contacts] : sorts) BOOST_TEST_CONTEXT(name) {
       Random random(306);

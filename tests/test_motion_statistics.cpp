@@ -157,6 +157,10 @@ BOOST_AUTO_TEST_CASE(contacts_have_their_own) {
   const VectorXd usage = computeConeUsage(contact);
   BOOST_TEST(std::isnan(usage[0]));
   BOOST_TEST(usage[2] == 0.9);
+  // A cone's usage is that already.
+  contact.friction.friction = FrictionModel::Cone;
+  BOOST_TEST(computeConeUsage(contact)[1] == 0.8);
+  contact.friction.friction = FrictionModel::OuterPyramid;
   BOOST_TEST(statistics.least_cop_margin == 0.03);
 
   contact.active.setConstant(false);

@@ -82,6 +82,7 @@ class DYNACOM_EXPORT Contact6D : public ContactBase {
  private:
   template <class Value>
   void change(Value Contact6DSettings::*field, const Value& value);
+  void changeWeights(const Vector6& weights);
   void updateMatrices();
 
   Contact6DSettings settings_;

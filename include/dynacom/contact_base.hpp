@@ -172,6 +172,11 @@ class DYNACOM_EXPORT ContactBase {
                    const Eigen::Ref<const Eigen::VectorXd>& reg_A,
                    const Eigen::Ref<const Eigen::VectorXd>& reg_b, const ContactSet& set);
 
+  /// Gives the contact other weights, and nothing else: that allocates nothing.
+  /// @param reg_A  as many components as before
+  /// @throws std::invalid_argument if there are others
+  void setWeights(const Eigen::Ref<const Eigen::VectorXd>& reg_A);
+
   /// Forgets frame index, force and ne_A(). For initialize(), after setMatrices().
   void reset();
 

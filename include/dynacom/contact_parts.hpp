@@ -45,7 +45,7 @@ struct DYNACOM_EXPORT PartRobot {
 ///         robot's initialize()
 DYNACOM_EXPORT PartRobot splitContacts(const DynaCoM& robot,
                                        const std::vector<BodyPoints>& bodies = {},
-                                       FrictionModel friction = FrictionModel::OuterPyramid);
+                                       FrictionModel friction = FrictionModel::Cone);
 
 /// What the contacts of a robot do, from what their parts do: a contact is active if any of its
 /// parts is, and its wrench is the sum of theirs, in its own axes about its own origin. The forces

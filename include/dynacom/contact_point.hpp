@@ -68,7 +68,7 @@ class DYNACOM_EXPORT ContactPoint : public ContactBase {
 
  private:
   template <class Value>
-  void change(Value ContactPointSettings::*field, const Value& value);
+  void changeSettings(Value ContactPointSettings::*field, const Value& value);
   void updateMatrices();
 
   ContactPointSettings settings_;

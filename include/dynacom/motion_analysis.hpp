@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynacom/contact_schedule.hpp"
+#include "dynacom/surface_options.hpp"
 
 namespace dynacom {
 
@@ -54,6 +55,7 @@ struct MotionAnalysis {
     /// getContactCoPMargin() [m]; NaN where not active.
     Eigen::Matrix2Xd cop;
     Eigen::VectorXd friction_usage, yaw_usage, cop_margin;
+    SurfaceOptions friction;  ///< whose usage that is
   };
 
   /// What a link does that touches something besides the contacts.

@@ -24,6 +24,10 @@ struct DYNACOM_EXPORT ExaminationSettings {
   AnalysisSettings analysis = {};
   DetectionSettings detection = {};
   VerdictSettings verdict = {};
+  /// Of contacts that are outer pyramids, as they are unless they say otherwise, and of links, see
+  /// splitContacts(). The outer pyramid itself lets forces pass that are up to 41 % beyond
+  /// Coulomb's cone.
+  FrictionModel friction = FrictionModel::Cone;
   /// Links that may touch the ground besides the contacts, of findCollisionPoints(); they are
   /// looked at where the contacts alone cannot give what the motion needs.
   std::vector<BodyPoints> bodies = {};

@@ -7,6 +7,7 @@ A settings file is YAML; what it does not name stays at its default::
     omega: 0.0            # of VRP and DCM [rad/s]; 0 for that of the CoM's mean height
     flat: true            # the ground is flat and horizontal: see the CoP
     feet_only: false      # nothing but the contacts of the robot file may touch the ground
+    friction: cone        # or outer-pyramid, inner-pyramid, facets; null for the robot file's
     distance: true        # how far is the motion from a feasible one?
     filter: {com: 0.01}   # CentroidalFilterSettings, field by field: how that is found
     detection:            # DetectionSettings, field by field
@@ -34,13 +35,14 @@ from dynacom.dynacom_pywrap import (
     CentroidalFilterSettings,
     DetectionSettings,
     FaultLimit,
+    FrictionModel,
     RepairSettings,
     VerdictSettings,
     kAutomaticCutoff,
 )
 from dynacom.errors import DynacomError
 from dynacom.presets import preset_values
-from dynacom.robots import Robot
+from dynacom.robots import FRICTION_MODELS, Robot
 from dynacom.yaml_file import is_number, parse_yaml, read_yaml
 
 #: What a cut-off is called that suits the motion.
@@ -101,6 +103,9 @@ class AnalysisOptions:
         flat: whether the centre of pressure is that of flat horizontal ground.
         feet_only: whether nothing but the robot's contacts may touch the ground; else its links
             may, too, where contacts do not suffice.
+        friction: of contacts that are outer pyramids, as they are unless they say otherwise, and of
+            links: "cone", "outer-pyramid", "inner-pyramid" or "facets"; None for what the robot
+            file says, which is the cone by default.
         distance: whether to find how far motions are from feasible ones.
         filter: how that is found, see ``distanceToFeasible``.
         detection: how contacts are found, see ``inferContacts``.
@@ -113,6 +118,7 @@ class AnalysisOptions:
     omega: float = 0.0
     flat: bool = True
     feet_only: bool = False
+    friction: str | None = None
     distance: bool = True
     filter: CentroidalFilterSettings = field(default_factory=CentroidalFilterSettings)
     detection: DetectionSettings = field(default_factory=DetectionSettings)
@@ -130,8 +136,17 @@ class AnalysisOptions:
             raise ValueError(f"cutoff must be finite and >= 0 Hz, {AUTO} or none, got {cutoff:g}")
         if not (math.isfinite(self.omega) and self.omega >= 0.0):
             raise ValueError(f"omega must be finite and >= 0 rad/s, got {self.omega:g}")
+        if self.friction is not None and self.friction not in FRICTION_MODELS:
+            raise ValueError(
+                f"friction must be one of {', '.join(FRICTION_MODELS)} or none, "
+                f"got {self.friction!r}"
+            )
         for group in _GROUP_NAMES:
             getattr(self, group).validate()
+
+    def friction_model(self, robot: Robot) -> FrictionModel:
+        """By what motions of a robot are judged where its contacts are outer pyramids."""
+        return robot.friction if self.friction is None else FRICTION_MODELS[self.friction]
 
     def update(self, values: Any, where: str) -> None:
         """Changes some of the settings; all of them or, where it raises, none.
@@ -242,7 +257,14 @@ def _without_nan(value: Any) -> Any:
 
 
 # What null stands for, where it may.
-_NULL = {"cutoff": None, "ground_height": math.nan, "ground_velocity": np.full(3, math.nan)}
+_NULL = {
+    "cutoff": None,
+    "friction": None,
+    "ground_height": math.nan,
+    "ground_velocity": np.full(3, math.nan),
+}
+# What is one of some words.
+_WORDS = {"friction": FRICTION_MODELS}
 # What may be found by itself.
 _AUTO = {"cutoff"}
 
@@ -264,6 +286,12 @@ def _update(group: Any, values: Any, where: str) -> None:
             setattr(group, name, value)
         elif value is None and name in _NULL:
             setattr(group, name, _NULL[name])
+        elif name in _WORDS:
+            if not (isinstance(value, str) and value in _WORDS[name]):
+                raise DynacomError(
+                    f"{where}: {name} must be {', '.join(_WORDS[name])} or null, got {value!r}"
+                )
+            setattr(group, name, value)
         elif isinstance(now, np.ndarray):
             if not (isinstance(value, list) and len(value) == 3 and all(map(is_number, value))):
                 raise DynacomError(

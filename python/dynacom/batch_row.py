@@ -135,7 +135,8 @@ class Job:
             name: (type(settings) is Contact6DSettings, _fields(settings))
             for name, settings in robot.contacts.items()
         }
-        parts = (robot.name, robot.model, contacts, robot.urdf, robot.default, robot.joint_layouts)
+        others = (robot.urdf, robot.default, robot.joint_layouts, robot.friction)
+        parts = (robot.name, robot.model, contacts, *others)
         # Meshes are read once, and not by every process.
         points = None if self.options.feet_only else robot.collision_points
         options = self.options.to_dict()
@@ -154,6 +155,7 @@ class Job:
             "default": robot.default.tolist(),
             "joint_layouts": robot.joint_layouts,
             "contacts": {name: _jsonable(s) for name, s in robot.contacts.items()},
+            "friction": str(self.options.friction_model(robot)),
             "bodies": None if self.options.feet_only else _digest_bodies(robot),
             "options": options,
             "fps": self.fps,
@@ -203,7 +205,7 @@ class Job:
 def _make_job(
     parts: tuple, points: CollisionPoints | None, options: dict[str, Any], *others: Any
 ) -> Job:
-    name, model, contacts, urdf, default, layouts = parts
+    name, model, contacts, *rest = parts
     made = {}
     for contact, (is_6d, values) in contacts.items():
         made[contact] = settings = Contact6DSettings() if is_6d else ContactPointSettings()
@@ -211,7 +213,7 @@ def _make_job(
             setattr(settings, key, value)
     own = AnalysisOptions()
     own.update(options, "options")
-    robot = Robot(name, model, made, urdf, default, layouts)
+    robot = Robot(name, model, made, *rest)
     if points is not None:
         vars(robot)["collision_points"] = points  # as functools.cached_property keeps it
     return Job(robot, own, *others)

@@ -169,6 +169,15 @@ class _Request:
             help="Nothing but the robot's contacts touches the ground: no knees, no hands.",
         ),
     ] = False
+    friction: Annotated[
+        str | None,
+        typer.Option(
+            "--friction",
+            metavar="cone|outer-pyramid|inner-pyramid|facets",
+            help="What limits the friction of contacts that do not say otherwise; Coulomb's cone "
+            "by default.",
+        ),
+    ] = None
     flat: Annotated[
         bool | None,
         typer.Option("--flat/--uneven", help="Is the ground flat and horizontal? See the CoP."),
@@ -240,6 +249,7 @@ class _Request:
         if self.cutoff is not None:
             options.update_from_texts([f"cutoff={self.cutoff}"])
         values = {
+            "friction": self.friction,
             "flat": self.flat,
             "omega": self.omega,
             "distance": self.distance,

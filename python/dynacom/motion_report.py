@@ -350,6 +350,7 @@ def make_examiner(
         bodies=[] if options.feet_only or not robot.contacts else robot.collision_points.bodies,
         distance=options.distance,
         filter=options.filter,
+        friction=options.friction_model(robot),
         **others,
     )
 

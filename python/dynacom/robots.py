@@ -12,6 +12,9 @@ A robot file is YAML::
         rpy: [0, 0, 0]        #   like this in the one above [m], [rad]
         mu: 0.7
         weights: [1, 1, 1, 1, 1, 1]  # optional; three for a point
+        friction: outer-pyramid      # optional: cone, inner-pyramid, or facets, of which there are
+        facets: 8                    #   so many, the first one turned by an angle [rad]
+        facet_angle: 0.0
         # kind 6d only
         gu: 0.05
         half_length: 0.1
@@ -19,13 +22,15 @@ A robot file is YAML::
         # kind point only, optional
         world_aligned: true
         radius: 0.02
+    friction: cone            # optional: by what motions are judged, see docs/verdict.md
     default:                  # optional: joints that are not zero where nothing is known of them
       left_elbow_joint: 0.5   #   [rad], or [m] where they slide
     joint_layouts:            # optional: joints of the robot's smaller versions, in their order
       - [left_hip_joint, left_knee_joint, right_hip_joint, right_knee_joint]
 
-The keys from ``mu`` on are the fields of ``Contact6DSettings`` and ``ContactPointSettings``, and
-mean the same. The files in the package's folder ``robots`` are known by their names.
+The contacts' keys from ``mu`` on are the fields of ``Contact6DSettings`` and
+``ContactPointSettings``, and mean the same. The files in the package's folder ``robots`` are known
+by their names.
 """
 
 import math
@@ -48,12 +53,21 @@ from dynacom.dynacom_pywrap import (
     ContactPointSettings,
     DynaCoM,
     DynaCoMSettings,
+    FrictionModel,
     findCollisionPoints,
 )
 from dynacom.errors import DynacomError
 from dynacom.yaml_file import is_number, read_yaml
 
 ContactSettings: TypeAlias = ContactPointSettings | Contact6DSettings
+
+#: What friction is called in robot files, settings and on the command line.
+FRICTION_MODELS: Mapping[str, FrictionModel] = {
+    "cone": FrictionModel.Cone,
+    "outer-pyramid": FrictionModel.OuterPyramid,
+    "inner-pyramid": FrictionModel.InnerPyramid,
+    "facets": FrictionModel.Facets,
+}
 
 #: What forces are compared with in verdicts, whatever gravity is [m/s^2].
 STANDARD_GRAVITY = 9.81
@@ -87,6 +101,7 @@ class RobotFile:
     default: Mapping[str, float] = field(default_factory=dict)
     #: As in :class:`Robot`.
     joint_layouts: tuple[tuple[str, ...], ...] = ()
+    friction: FrictionModel = FrictionModel.Cone
 
     @property
     def name(self) -> str:
@@ -135,6 +150,9 @@ class Robot:
     #: Names of joints, in their order, of the robot's smaller versions: for motions that have fewer
     #: joints than the robot, and no names. No two are equally long.
     joint_layouts: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
+    #: By what motions are judged where a contact is an outer pyramid, as it is by default, and
+    #: where links touch something. What :meth:`dynacom` makes knows nothing of it.
+    friction: FrictionModel = FrictionModel.Cone
 
     @cached_property
     def joints(self) -> Joints:
@@ -327,6 +345,7 @@ def read_robot_file(path: str | Path) -> RobotFile:
         tuple(contacts),
         keys.get("default", {}),
         keys.get("joint_layouts", ()),
+        keys.get("friction", FrictionModel.Cone),
     )
 
 
@@ -367,6 +386,18 @@ def _numbers(count: int) -> Callable[[Any], np.ndarray]:
     return read
 
 
+def _whole_number(value: Any) -> int:
+    if not is_number(value) or value != int(value):
+        raise ValueError("a whole number")
+    return int(value)
+
+
+def _friction(value: Any) -> FrictionModel:
+    if not isinstance(value, str) or value not in FRICTION_MODELS:
+        raise ValueError(f"one of {', '.join(FRICTION_MODELS)}")
+    return FRICTION_MODELS[value]
+
+
 def _coordinates(value: Any) -> dict[str, float]:
     if not isinstance(value, dict) or not all(
         isinstance(joint, str) and is_number(number) for joint, number in value.items()
@@ -396,23 +427,28 @@ class _Keys:
 _SETTINGS = {"point": ContactPointSettings, "6d": Contact6DSettings}
 
 _ROBOT_KEYS = _Keys(
-    {"urdf": _text, "contacts": _list}, {"default": _coordinates, "joint_layouts": _layouts}
+    {"urdf": _text, "contacts": _list},
+    {"friction": _friction, "default": _coordinates, "joint_layouts": _layouts},
 )
 
 # The keys that are not fields of the settings.
 _PLACE_REQUIRED = {"name": _text, "kind": _text, "frame": _text}
 _PLACE_OPTIONAL = {"xyz": _numbers(3), "rpy": _numbers(3)}
 _PLACE_KEYS = _PLACE_REQUIRED.keys() | _PLACE_OPTIONAL.keys()
+_FRICTION_KEYS = {"friction": _friction, "facets": _whole_number, "facet_angle": _number}
 
 _CONTACT_KEYS = {
     "point": _Keys(
         _PLACE_REQUIRED | {"mu": _number},
-        _PLACE_OPTIONAL | {"weights": _numbers(3), "world_aligned": _boolean, "radius": _number},
+        _PLACE_OPTIONAL
+        | {"weights": _numbers(3)}
+        | _FRICTION_KEYS
+        | {"world_aligned": _boolean, "radius": _number},
     ),
     "6d": _Keys(
         _PLACE_REQUIRED
         | {"mu": _number, "gu": _number, "half_length": _number, "half_width": _number},
-        _PLACE_OPTIONAL | {"weights": _numbers(6)},
+        _PLACE_OPTIONAL | {"weights": _numbers(6)} | _FRICTION_KEYS,
     ),
 }
 
@@ -549,7 +585,7 @@ def _make_robot(file: RobotFile, urdf: Path) -> Robot:
         if entry.placement is not None:
             entry.settings.frame_name = _add_frame(model, frame, entry, where)
         contacts[entry.name] = entry.settings
-    return Robot(file.name, model, contacts, urdf, default, file.joint_layouts)
+    return Robot(file.name, model, contacts, urdf, default, file.joint_layouts, file.friction)
 
 
 def _read_urdf(urdf: Path, path: Path) -> pin.Model:

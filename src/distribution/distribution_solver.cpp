@@ -57,6 +57,9 @@ constexpr int kSlowRounds = 4;
 // Of a direction that faces span, what remains outside of the others: more than the first, it is
 // one of its own, less than the second, it is rounding.
 constexpr double kIndependent = 1e-6, kDependent = 1e-11;
+// What faces that hardly span a direction may leave of the wrench: contacts on a line but for what
+// a model's numbers are off.
+constexpr double kHardlySpanned = 1e-9;
 // Of the residual, a component that exposes a face.
 constexpr double kExposed = 1e-9;
 // One that surely does not, and one that surely does, beyond rounding; and how far the closest
@@ -338,12 +341,12 @@ struct DistributionSolver::Workspace {
   double enough() const { return std::max(may_lack, kRounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
-  bool relax(const Vector6& start);
-  bool spanFaces(Matrix6& basis, int& rank, Vector6& fixed);
-  bool findResidual(Matrix6& outside);
-  bool reachClosest(const Vector6& start, const Matrix6& outside);
+  bool relax(const Vector6& start, bool is_certain = true);
+  bool spanFaces(bool is_certain, Matrix6& basis, int& rank, Vector6& fixed);
+  bool findResidual(bool is_certain, Matrix6& outside);
+  bool reachClosest(bool is_certain, const Vector6& start, const Matrix6& outside);
   bool exposesClearly();
-  bool reachOnFaces(const Matrix6& outside);
+  bool reachOnFaces(const Matrix6& outside, double may_be_left);
   std::vector<Vector6> directions;
 };
 
@@ -517,7 +520,11 @@ DistributionStatus DistributionSolver::Workspace::search() {
     if (size <= enough()) return DistributionStatus::Solved;
     // What stays is out of reach, if it proves so.
     const bool stays = (lacking - former_missing).norm() <= 0.1 * size;
-    if ((round == 0 || stays) && relax(multipliers)) return DistributionStatus::Relaxed;
+    if (round == 0 || stays) {
+      if (relax(multipliers)) return DistributionStatus::Relaxed;
+      // No smaller slack will tell more.
+      if (slack <= least_slack && relax(multipliers, false)) return DistributionStatus::Relaxed;
+    }
     former_missing = lacking;
     if (size > kFall * former) slack = std::max(slack * kSlackFactor, least_slack);
     former = size;
@@ -528,8 +535,9 @@ DistributionStatus DistributionSolver::Workspace::search() {
 }
 
 // An orthonormal basis of the wrenches that the faces span, and the wrench that all forces in them
-// share. Returns false if the rank is not certain.
-bool DistributionSolver::Workspace::spanFaces(Matrix6& basis, int& rank, Vector6& fixed) {
+// share. Returns false if the rank is not certain, and is to be.
+bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, int& rank,
+                                              Vector6& fixed) {
   directions.clear();
   fixed.setZero();
   for (const Block& block : blocks) {
@@ -538,7 +546,8 @@ bool DistributionSolver::Workspace::spanFaces(Matrix6& basis, int& rank, Vector6
     for (int k = 0; k < span.count; ++k)
       directions.push_back(block.wrenchOf(span.axes.col(k)).normalized());
   }
-  return internal::findSpan(directions, kIndependent, kDependent, basis, rank);
+  return internal::findSpan(directions, kIndependent, is_certain ? kDependent : kIndependent, basis,
+                            rank);
 }
 
 // What is missing of the closest wrench, from the forces at hand and a guess: the part of the
@@ -547,7 +556,7 @@ bool DistributionSolver::Workspace::spanFaces(Matrix6& basis, int& rank, Vector6
 // those that it exposes.
 //
 // @param outside  the projector on what they do not span
-bool DistributionSolver::Workspace::findResidual(Matrix6& outside) {
+bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outside) {
   bool is_found = false;
   for (int step = 0; step < kResidualSteps && !is_found; ++step) {
     Matrix6 bend = Matrix6::Zero();
@@ -562,7 +571,7 @@ bool DistributionSolver::Workspace::findResidual(Matrix6& outside) {
     Matrix6 basis;
     int rank = 0;
     Vector6 fixed;
-    if (!spanFaces(basis, rank, fixed) || rank == 6) return false;
+    if (!spanFaces(is_certain, basis, rank, fixed) || rank == 6) return false;
     outside.noalias() = Matrix6::Identity() - basis * basis.transpose();
     const Vector6 rest = target - fixed;
     if (!is_bent) {
@@ -593,7 +602,8 @@ bool DistributionSolver::Workspace::findResidual(Matrix6& outside) {
 }
 
 // The cheapest forces on the faces that give the target, from the multipliers at hand.
-bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside) {
+// @param may_be_left  of the target
+bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double may_be_left) {
   const Which face = &Block::face;
   // What is missing of the target is to be accurate: nothing but rounding may be off.
   may_lack = 0.;
@@ -619,7 +629,7 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside) {
     }
     // Multipliers of what faces do not give mean nothing.
     evaluate(multipliers - outside * multipliers, face);
-    given = missing().norm() <= std::max(kMissing, enough());
+    given = missing().norm() <= std::max(may_be_left, enough());
   }
   may_lack = kMissing;
   return given;
@@ -629,13 +639,14 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside) {
 // residual exposes, and the proof of both.
 //
 // What the minimum with slack lacks is nearly the residual.
-// @param start  from which multipliers on the forces are sought
-bool DistributionSolver::Workspace::relax(const Vector6& start) {
+// @param start       from which multipliers on the forces are sought
+// @param is_certain  whether a direction that faces hardly span is not to be left out
+bool DistributionSolver::Workspace::relax(const Vector6& start, bool is_certain) {
   residual = missing();
   if (residual.norm() > kReach) {
     const Vector6 kept = multipliers;
     Matrix6 outside;
-    if (findResidual(outside) && reachClosest(start, outside)) {
+    if (findResidual(is_certain, outside) && reachClosest(is_certain, start, outside)) {
       slackened = kept;
       return true;
     }
@@ -646,14 +657,16 @@ bool DistributionSolver::Workspace::relax(const Vector6& start) {
 }
 
 // The cheapest forces that leave the residual, and the proof of both.
-bool DistributionSolver::Workspace::reachClosest(const Vector6& start, const Matrix6& outside) {
-  const double size = residual.norm();
+bool DistributionSolver::Workspace::reachClosest(bool is_certain, const Vector6& start,
+                                                 const Matrix6& outside) {
   const Vector6 asked = target;
   target -= residual;
   multipliers = start - outside * start;
-  const bool given = reachOnFaces(outside);
+  const bool given = reachOnFaces(outside, is_certain ? kMissing : kHardlySpanned);
   target = asked;
   if (!given) return false;
+  if (!is_certain) residual = missing();
+  const double size = residual.norm();
   // No reachable wrench is closer: forces are as far in the direction of the residual as any.
   double gap = 0.;
   for (const Block& block : blocks) {
@@ -661,7 +674,8 @@ bool DistributionSolver::Workspace::reachClosest(const Vector6& start, const Mat
     gap += std::max(0., block.set.support(pull, kExposed * size * block.reach()) -
                             pull.dot(block.response.force));
   }
-  is_accurate = size >= kFar * weights.maxCoeff() / weights.minCoeff() && exposesClearly();
+  is_accurate =
+      is_certain && size >= kFar * weights.maxCoeff() / weights.minCoeff() && exposesClearly();
   return gap <= kReach * size;
 }
 

@@ -401,7 +401,8 @@ class MotionRepairer::Workspace::Ladder {
   Attempt tryWith(const RepairSettings& settings, const Contacts& contacts,
                   const ContactSchedule& schedule, const Eigen::MatrixXd& start,
                   bool is_new) const {
-    const PartRobot parts = splitContacts(workspace_.robot, contacts.links);
+    const PartRobot parts =
+        splitContacts(workspace_.robot, contacts.links, settings_.examination.friction);
     RepairGround ground;
     if (settings.feet) ground = findRepairGround(parts.parts, contacts.inference, recorded_.time);
     RepairedMotion repaired = repairMotion(parts, found_.before.derived.motion, schedule, settings,

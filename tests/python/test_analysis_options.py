@@ -154,7 +154,7 @@ def test_every_setting_can_be_set_by_a_text():
     costs = repr(CentroidalFilterSettings()).count("=")
     verdict = repr(dynacom.VerdictSettings()).count("=") + len(dynacom.describeFaults())
     repair = repr(RepairSettings()).count("=") + repr(LadderSettings()).count("=")
-    constants = len(every) - 2 - 5 - costs - verdict - repair
+    constants = len(every) - 2 - 6 - costs - verdict - repair
     assert constants == repr(DetectionSettings()).count("=") - 2 > 30
     for path in every:
         value, text = 0.51, "0.51"
@@ -164,6 +164,8 @@ def test_every_setting_can_be_set_by_a_text():
             value, text = True, "true"
         elif path in ("repair.feet", "repair.joints"):
             value, text = False, "false"
+        elif path == "friction":
+            value, text = "facets", "facets"
         elif path == "ladder.rounds":
             value, text = 4, "4"
         elif path == "ladder.largest_stretch":
@@ -309,7 +311,7 @@ def test_presets_that_cannot_be(options, talos, tmp_path):
         ("cutoff", ["setting must be NAME=VALUE", "got 'cutoff'"]),
         ("cutoff=", ["setting must be NAME=VALUE", "got 'cutoff='"]),
         ("", ["setting must be NAME=VALUE", "got ''"]),
-        ("=3", ["setting '=3'", "unknown setting ''", "feet_only, distance, filter, detection"]),
+        ("=3", ["setting '=3'", "unknown setting ''", "feet_only, friction, distance"]),
         ("speed=3", ["setting 'speed=3'", "unknown setting 'speed'", "expected cutoff"]),
         ("detection.mu=3", ["detection: unknown setting 'mu'", "expected rest_speed_part"]),
         ("verdict.feasible=3", ["verdict: unknown setting 'feasible'", "residual_force"]),

@@ -93,7 +93,15 @@ def test_help(command):
     assert "[rad/s]" in out
     for option in (
         *("--robot", "--urdf", "--contact", "--payload", "--fps", "--quat", "--trust", "--clip"),
-        *("--schedule", "--cutoff", "--ground-height", "--flat", "--uneven", "--omega"),
+        *(
+            "--schedule",
+            "--cutoff",
+            "--ground-height",
+            "--friction",
+            "--flat",
+            "--uneven",
+            "--omega",
+        ),
         *("--settings", "--set", "--out", "--csv", "--page", "--no-page", "--check"),
         *("--distance", "--no-distance", "--preset"),
     ):
@@ -408,6 +416,14 @@ def test_flat_overrules_a_file(analyze, tmp_path):
     for arguments, flat in (([], False), (["--flat"], True)):
         out, _ = analyze(WALK, "--settings", path, *arguments)
         assert summary(out)["options"]["flat"] is flat
+
+
+def test_friction(analyze, run):
+    out, _ = analyze(WALK, "--friction", "outer-pyramid")
+    assert summary(out)["options"]["friction"] == "outer-pyramid"
+    done = run("analyze", WALK, "--robot", "talos", "--friction", "round")
+    assert done.returncode == 2
+    assert "friction must be cone, outer-pyramid, inner-pyramid, facets or null" in done.stderr
 
 
 @pytest.mark.parametrize(("given", "cutoff"), [("7.5", 7.5), ("0", None)])

@@ -22,6 +22,7 @@ from dynacom import (
     ContactSchedule,
     DistributionStatus,
     DynacomError,
+    FrictionModel,
     Motion,
     analyzeMotion,
     computeContactMotions,
@@ -570,6 +571,22 @@ def test_own_file(robot_file, name):
     np.testing.assert_array_equal(robot.contacts["sole"].weights, np.ones(6))
 
 
+def test_friction(robot_file):
+    """Of contacts, and by what motions are judged; else they are what the classes are."""
+    contacts = with_contacts(
+        POINT | {"friction": "cone"},
+        SOLE | {"friction": "facets", "facets": 6, "facet_angle": 0.25},
+        POINT | {"name": "heel"},
+    )
+    robot = load_robot(robot_file(contacts | {"friction": "inner-pyramid"}))
+    assert robot.friction == FrictionModel.InnerPyramid
+    assert robot.contacts["toe"].friction == FrictionModel.Cone
+    sole = robot.contacts["sole"]
+    assert (sole.friction, sole.facets, sole.facet_angle) == (FrictionModel.Facets, 6, 0.25)
+    assert robot.contacts["heel"].friction == FrictionModel.OuterPyramid
+    assert load_robot(robot_file(contacts)).friction == FrictionModel.Cone
+
+
 def test_frames_of_contacts(robot_file):
     """xyz and rpy place a frame as in URDF, in the frame given."""
     robot = load_robot(
@@ -1020,14 +1037,27 @@ def refuses(path, *parts, load=load_robot):
 @pytest.mark.parametrize(
     ("content", "parts"),
     [
-        ("", ["must be a mapping with the keys urdf, contacts, default, joint_layouts, got None"]),
+        (
+            "",
+            [
+                "must be a mapping with the keys urdf, contacts, friction, default",
+                "joint_layouts, got None",
+            ],
+        ),
         (
             "[1, 2]",
-            ["must be a mapping with the keys urdf, contacts, default, joint_layouts, got [1, 2]"],
+            [
+                "must be a mapping with the keys urdf, contacts, friction, default",
+                "joint_layouts, got [1, 2]",
+            ],
         ),
         ("a: [", ["must be YAML"]),
         ("a: !!python/object:os.system {}", ["must be YAML"]),
         (with_contacts(POINT) | {"mass": 3}, ["unknown key 'mass', expected urdf, contacts"]),
+        (
+            with_contacts(POINT) | {"friction": "round"},
+            ["friction must be one of cone, outer-pyramid, inner-pyramid, facets, got 'round'"],
+        ),
         ({"contacts": [POINT]}, ["missing key 'urdf', got contacts"]),
         ({"urdf": "urdf/cart.urdf"}, ["missing key 'contacts', got urdf"]),
         (with_contacts(POINT) | {"urdf": 3}, ["urdf must be a text", "got 3"]),
@@ -1082,6 +1112,10 @@ def test_bad_file(robot_file, content, parts):
         (POINT | {"rpy": [0, 0, float("inf")]}, ["'toe': rpy must be a list of 3 finite"]),
         (POINT | {"weights": [1] * 6}, ["'toe': weights must be a list of 3 finite numbers"]),
         (POINT | {"weights": [1, 0, 1]}, ["'toe': ", "weights must be"]),
+        (POINT | {"friction": 1}, ["'toe': friction must be one of cone, outer-pyramid"]),
+        (POINT | {"facets": 6.5}, ["'toe': facets must be a whole number, got 6.5"]),
+        (POINT | {"facets": 3}, ["'toe': ", "facets must be from 4 to 64, got 3"]),
+        (POINT | {"facet_angle": "x"}, ["'toe': facet_angle must be a finite number, got 'x'"]),
         (POINT | {"gu": 1}, ["'toe': unknown key 'gu', expected name, kind, frame, mu, xyz"]),
         (POINT | {3: 1}, ["'toe': unknown key 3"]),
         (SOLE | {"radius": 1}, ["'sole': unknown key 'radius', expected"]),
