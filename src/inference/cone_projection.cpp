@@ -37,16 +37,14 @@ constexpr double kLost = 2.;
 using Edge = ConeProjection::Edge;
 
 Eigen::Vector2d placeOf(const Edge& edge, const Section& section) {
-  switch (section.shape()) {
-    case Section::Shape::Disc:
-      return section.radius() * Eigen::Vector2d(edge.x, edge.y);
-    case Section::Shape::Polygon:
-      return section.vertices().col(edge.corner);
-    case Section::Shape::Rectangle:
-      break;
+  if (section.shape() == Section::Shape::Rectangle) {
+    // Without branches, which nobody could predict.
+    const double x[2] = {section.upper().x(), section.lower().x()};
+    const double y[2] = {section.upper().y(), section.lower().y()};
+    return {x[edge.corner & 1], y[edge.corner >> 1]};
   }
-  return {edge.corner & 1 ? section.lower().x() : section.upper().x(),
-          edge.corner & 2 ? section.lower().y() : section.upper().y()};
+  if (section.shape() == Section::Shape::Polygon) return section.vertices().col(edge.corner);
+  return section.radius() * Eigen::Vector2d(edge.x, edge.y);
 }
 
 double along(const Edge& edge, const Eigen::Vector3d& pull) {
@@ -176,13 +174,15 @@ void ConeProjection::addStretch(const Edge& edge) {
 // the span of others; and solves for their factors.
 void ConeProjection::assemble() {
   const Vector6 target = target_;
-  target_ = stretch(target_);
+  if (stretches_ > 0) target_ = stretch(target_);
   const int edges = std::exchange(count_, 0);
   decomposed_ = 0;
   for (int k = 0; k < edges; ++k) {
     const double factor = factors_[k];
-    add(edges_[k], stretch(direction(edges_[k])));
-    factors_[k] = factor;
+    const Edge edge = edges_[k];
+    const Vector6 column = direction(edge);
+    add(edge, stretches_ > 0 ? stretch(column) : column);
+    factors_[count_ - 1] = factor;
   }
   target_ = target;
   while (count_ > 0 && !solve()) drop(decomposed_);
@@ -223,17 +223,17 @@ ConeProjection::Search ConeProjection::search(bool may_turn) const {
     const int point = __builtin_ctz(rest);
     const Eigen::Vector3d pull = force + torque.cross(Eigen::Vector3d(levers_->col(point)));
     const Section& section = friction_[point];
-    // The corner of the rectangle around the section.
-    const bool is_left = pull.x() < 0., is_below = pull.y() < 0.;
-    double value = pull.x() * (is_left ? section.lower().x() : section.upper().x()) +
-                   pull.y() * (is_below ? section.lower().y() : section.upper().y()) + pull.z();
+    // Of the rectangle around the section.
+    double value = std::max(pull.x() * section.lower().x(), pull.x() * section.upper().x()) +
+                   std::max(pull.y() * section.lower().y(), pull.y() * section.upper().y()) +
+                   pull.z();
     if (value <= slope) continue;
-    Edge edge = {std::int8_t(point), std::int8_t(is_left + 2 * is_below), 0., 0., 0.};
+    Edge edge = {std::int8_t(point), std::int8_t((pull.x() < 0.) + 2 * (pull.y() < 0.)), 0., 0., 0.};
     if (section.shape() == Section::Shape::Disc) {
+      edge.corner = 0;
       const double size = pull.head<2>().norm();
       value = section.radius() * size + pull.z();
       if (value <= slope) continue;
-      edge.corner = -1;
       edge.x = size > 0. ? pull.x() / size : 1.;
       edge.y = size > 0. ? pull.y() / size : 0.;
       if (may_turn) {
