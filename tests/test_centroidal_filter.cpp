@@ -17,7 +17,8 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// A body on the corners of a rectangle, whose CoM goes where it is told.
 struct Stander {
-  explicit Stander(Index frames, double rate = 100.) {
+  explicit Stander(Index frames, double rate = 100.,
+                   FrictionModel friction = FrictionModel::OuterPyramid) {
     pinocchio::Model model = singleBody(kMass, {});
     std::vector<PartRobot::Part> list;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -32,7 +33,9 @@ struct Stander {
     dynamics.ground_torque.setZero(3, frames);
     schedule.active.setConstant(4, frames, true);
     for (std::size_t k = 0; k < 4; ++k) {
-      parts[0].robot.addContact(makePoint(list[k].name, kFriction), list[k].name);
+      ContactPointSettings point = makePoint(list[k].name, kFriction)->getSettings();
+      point.friction = friction;
+      parts[0].robot.addContact(std::make_shared<ContactPoint>(point), list[k].name);
       schedule.names.push_back(list[k].name);
       ContactMotion motion;
       motion.name = list[k].name;
@@ -65,8 +68,9 @@ CentroidalFilterSettings exactSettings() {
 }
 
 /// Sways, is pushed and turned, and is in the air for some frames.
-Stander makeSwaying(Index frames, unsigned seed) {
-  Stander stander(frames, 50.);
+Stander makeSwaying(Index frames, unsigned seed,
+                    FrictionModel friction = FrictionModel::OuterPyramid) {
+  Stander stander(frames, 50., friction);
   Random random(seed);
   const Vector3d push = random.vector3(0.2), turn = random.vector3(0.05);
   for (Index k = 0; k < frames; ++k) {
@@ -189,6 +193,32 @@ BOOST_AUTO_TEST_CASE(a_mirrored_motion_changes_mirrored) {
   moved.dynamics.com.colwise() += Vector3d(3., -2., 1.);
   for (ContactMotion& motion : moved.motions) motion.position.colwise() += Vector3d(3., -2., 1.);
   BOOST_TEST(close(moved.filter().com, found.com, 1e-6));
+}
+
+BOOST_AUTO_TEST_CASE(a_turned_motion_on_cones_changes_turned) {
+  // Pushed diagonally, so that pyramids allow more.
+  const auto makeSliding = [](FrictionModel friction) {
+    Stander stander = makeSwaying(60, 6, friction);
+    for (Index k = 0; k < 60; ++k)
+      stander.dynamics.ground_force.col(k) +=
+          kWeight * 0.5 * std::sin(0.2 * double(k)) * Vector3d(1., 1., 0.);
+    return stander;
+  };
+  const auto turn = [](Stander stander) {
+    const Matrix3d about = Eigen::AngleAxisd(0.7, Vector3d::UnitZ()).toRotationMatrix();
+    stander.dynamics.com = about * stander.dynamics.com;
+    stander.dynamics.ground_force = about * stander.dynamics.ground_force;
+    stander.dynamics.ground_torque = about * stander.dynamics.ground_torque;
+    for (ContactMotion& motion : stander.motions) motion.position = about * motion.position;
+    return stander;
+  };
+  const CentroidalFilterSettings settings = exactSettings();
+  const Stander cones = makeSliding(FrictionModel::Cone);
+  const Stander pyramids = makeSliding(FrictionModel::OuterPyramid);
+  const double of_cones = cones.filter(settings).rms, of_pyramids = pyramids.filter(settings).rms;
+  BOOST_TEST(close(turn(cones).filter(settings).rms / of_cones, 1., 1e-4));
+  BOOST_TEST(!close(turn(pyramids).filter(settings).rms / of_pyramids, 1., 1e-2));
+  BOOST_TEST(of_cones > 1.01 * of_pyramids);
 }
 
 BOOST_AUTO_TEST_CASE(nothing_is_asked_of_frames_that_are_free) {

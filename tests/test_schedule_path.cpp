@@ -53,7 +53,8 @@ struct Problem {
         position[k].row(2).head(half).setZero();
         velocity[k].leftCols(half) *= 0.1;
       }
-      mu.push_back(random.uniform(0.4, 1.));
+      const double mu = random.uniform(0.4, 1.);
+      friction.push_back(random.coin() ? Section::disc(mu) : Section::facets(mu, 4));
       // One of two rests, of which the second carries only now and then.
       Rests own;
       own.list = {{0, 2, 0., true}, {2, frames, random.uniform(-0.02, 0.02), random.coin()}};
@@ -67,7 +68,7 @@ struct Problem {
   SchedulePath find(const KnownContacts* known = nullptr, const PathPieces& pieces = {}) const {
     std::vector<PointTrack> points;
     for (std::size_t k = 0; k < limbs.size(); ++k)
-      points.push_back({limbs[k], mu[k], false, position[k], velocity[k]});
+      points.push_back({limbs[k], friction[k], false, position[k], velocity[k]});
     return findSchedulePath(points, rests, scales, {com, force, torque}, kWeight, time, settings,
                             known, pieces);
   }
@@ -77,7 +78,7 @@ struct Problem {
   VectorXd time;
   Eigen::Matrix3Xd com, force, torque;
   std::vector<Eigen::Matrix3Xd> position, velocity;
-  std::vector<double> mu;
+  std::vector<Section> friction;
   std::vector<Rests> rests;
   CostScales scales = {0.01, 0.1, 0.03, 0.01};
   DetectionSettings settings;
@@ -197,7 +198,7 @@ class AllPaths {
     Eigen::Matrix3Xd levers(3, Index(problem_.limbs.size()));
     for (std::size_t k = 0; k < problem_.limbs.size(); ++k)
       levers.col(Index(k)) = problem_.position[k].col(frame) - problem_.com.col(frame);
-    const auto missing = ConeProjection(s.lever).project(wrench, levers, problem_.mu, set);
+    const auto missing = ConeProjection(s.lever).project(wrench, levers, problem_.friction, set);
     const double force = missing.force / kWeight, torque = missing.torque / kWeight;
     sum += s.dynamics_weight *
            (std::min(force / problem_.scales.force + torque / problem_.scales.torque,

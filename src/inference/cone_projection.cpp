@@ -6,19 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <utility>
-#ifdef PROJ_STATS
-#include <cstdio>
-#endif
 
 namespace dynacom::internal {
-
-#ifdef PROJ_STATS
-bool g_trace = false;
-long g_rounds, g_turns, g_adds, g_plain, g_capped;
-#define STAT(x) ++x
-#else
-#define STAT(x)
-#endif
 
 namespace {
 
@@ -128,6 +117,29 @@ Eigen::Vector3d ConeProjection::force(int point) const {
   return sum;
 }
 
+// Takes the last edge, which solve() found to be within the span of the others, in exchange for one
+// of these: for that which becomes zero first where it pushes in place of them. False if it would
+// come no closer.
+bool ConeProjection::exchange(double slope) {
+  const int last = count_ - 1;
+  std::array<double, kEdges> parts;  // of the others
+  double step = std::numeric_limits<double>::infinity(), outside = products_[last][last];
+  int leaving = -1;
+  for (int i = last - 1; i >= 0; --i) {
+    double value = L_[last][i];
+    outside -= value * value;
+    for (int k = i + 1; k < last; ++k) value -= L_[k][i] * parts[k];
+    parts[i] = value * inverse_[i];
+    if (parts[i] > 0. && factors_[i] < step * parts[i]) step = factors_[i] / parts[i], leaving = i;
+  }
+  if (leaving < 0 || !(slope > step * std::max(outside, 0.))) return false;
+  for (int k = 0; k < last; ++k) factors_[k] -= step * parts[k];
+  factors_[last] = step;
+  drop(leaving);
+  while (count_ > 0 && !solve()) drop(decomposed_);
+  return true;
+}
+
 // Leads on from the factors that there are to those of least squares. On the way, whichever becomes
 // zero first is left.
 void ConeProjection::minimize() {
@@ -217,8 +229,8 @@ bool ConeProjection::isUseless(const Edge& edge) const {
 
 ConeProjection::Search ConeProjection::search(bool may_turn) const {
   const Eigen::Vector3d force = residual_.head<3>(), torque = residual_.tail<3>() / lever_;
-  Search found = {{-1, 0, 0., 0., 0.}, false};
-  double slope = negligible_;
+  Search found = {{-1, 0, 0., 0., 0.}, negligible_, false};
+  double& slope = found.slope;
   for (std::uint32_t rest = set_; rest != 0; rest &= rest - 1) {
     const int point = __builtin_ctz(rest);
     const Eigen::Vector3d pull = force + torque.cross(Eigen::Vector3d(levers_->col(point)));
@@ -228,7 +240,8 @@ ConeProjection::Search ConeProjection::search(bool may_turn) const {
                    std::max(pull.y() * section.lower().y(), pull.y() * section.upper().y()) +
                    pull.z();
     if (value <= slope) continue;
-    Edge edge = {std::int8_t(point), std::int8_t((pull.x() < 0.) + 2 * (pull.y() < 0.)), 0., 0., 0.};
+    Edge edge = {std::int8_t(point), std::int16_t((pull.x() < 0.) + 2 * (pull.y() < 0.)), 0., 0.,
+                 0.};
     if (section.shape() == Section::Shape::Disc) {
       edge.corner = 0;
       const double size = pull.head<2>().norm();
@@ -253,7 +266,7 @@ ConeProjection::Search ConeProjection::search(bool may_turn) const {
       Eigen::Index corner;
       value = (pull.head<2>().transpose() * section.vertices()).maxCoeff(&corner) + pull.z();
       if (value <= slope) continue;
-      edge.corner = std::int8_t(corner);
+      edge.corner = std::int16_t(corner);
     }
     if (isUseless(edge)) continue;
     found.best = edge;
@@ -298,16 +311,15 @@ void ConeProjection::findTurns() {
     const Eigen::Vector3d pulled = pull(residual_, edge.point);
     const double size = pulled.head<2>().norm();
     if (size <= negligible_) continue;
-    const bool is_alone = std::none_of(edges_.begin(), edges_.begin() + count_, [&](const Edge& other) {
-      return &other != &edge && other.point == edge.point;
-    });
+    const bool is_alone = std::none_of(
+        edges_.begin(), edges_.begin() + count_,
+        [&](const Edge& other) { return &other != &edge && other.point == edge.point; });
     if (!is_alone) {
       const bool goes_on = section.radius() * size + pulled.z() > negligible_;
       if (!goes_on || !(along(edge, pulled) > kMerged * size)) continue;
       merge(k, pulled);
     }
-    edge.turning =
-        factors_[k] * section.radius() / std::max(along(edge, pulled), negligible_);
+    edge.turning = factors_[k] * section.radius() / std::max(along(edge, pulled), negligible_);
     if (edge.turning > 0.) addStretch(edge);
   }
 }
@@ -356,20 +368,20 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
   State closest;
   closest.count = 0;
   for (int round = 0; round < kRounds; ++round) {
-    STAT(g_rounds);
     residual_ = target_;
     for (int k = 0; k < count_; ++k) residual_ -= factors_[k] * columns_.col(k);
     if (size == 0.) break;
     const double square = residual_.squaredNorm();
     const bool is_closer = square < least;
-    if (is_closer) failures = 0;
-    else if (is_turned) failures = square > kLost * least ? kFailures : failures + 1;
+    if (is_closer)
+      failures = 0;
+    else if (is_turned)
+      failures = square > kLost * least ? kFailures : failures + 1;
     least = std::min(square, least);
     const bool may_turn = failures < kFailures;
     const Search found = search(may_turn);
     if (is_turned && !found.turns && found.best.point < 0 && isBalanced()) break;
     if (may_turn && (found.turns || is_turned)) {
-      STAT(g_turns);
       if (is_closer) closest = {edges_, factors_, count_};
       findTurns();
       if (is_closer && found.best.point >= 0 && count_ < kEdges) {
@@ -381,7 +393,6 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
       if (stretches_ > 0) applyTurns();
       is_turned = true;
     } else if (is_turned) {
-      STAT(g_plain);
       // Back to where least squares with the edges as they are lead on.
       if (!is_closer) {
         edges_ = closest.edges;
@@ -394,9 +405,8 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
       is_turned = false;
     } else {
       if (found.best.point < 0 || count_ == kEdges) break;
-      STAT(g_adds);
       add(found.best, direction(found.best));
-      if (!solve()) {
+      if (!solve() && !exchange(found.slope)) {
         drop(count_ - 1);
         useless_[static_cast<std::size_t>(useless_count_++)] = found.best;
         continue;

@@ -13,12 +13,13 @@ namespace dynacom::internal {
 /// The wrench closest to a given one among those that points can give together, each of which
 /// pushes within its friction cone: f_z ≥ 0, (f_x, f_y) ∈ f_z F, in the world's axes.
 ///
-/// Such wrenches are sums of the cones' edges with factors ≥ 0, so that the closest one is a problem
-/// of non-negative least squares, solved by the active-set method of Lawson and Hanson (Solving Least
-/// Squares Problems, 1974, chapter 23). Of each point only that edge is looked at which goes furthest
-/// along the residual's pull on the point: a corner of F or, of a disc, the point of its rim in the
-/// pull's direction. Since that turns with the residual, edges of discs are turned by Newton's
-/// method; see docs/algorithm.md.
+/// Such wrenches are sums of the cones' edges with factors ≥ 0, so that the closest one is a
+/// problem of non-negative least squares, solved by the active-set method of Lawson and Hanson
+/// (Solving Least Squares Problems, 1974, chapter 23). Of each point only that edge is looked at
+/// which goes furthest along the residual's pull on the point: a corner of F or, of a disc, the
+/// point of its rim in the pull's direction. Since that turns with the residual, ever more edges of
+/// a disc would come ever closer to it. Newton's method turns those that there are; see
+/// docs/repair.md.
 class ConeProjection {
  public:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -65,9 +66,9 @@ class ConeProjection {
   /// The edge of a cone, along which a point pushes.
   struct Edge {
     std::int8_t point;
-    std::int8_t corner;  // of a rectangle, a bit for each axis that is negative; or of a polygon
-    double x, y;         // of a disc, the direction from its centre
-    double turning;      // by how much the force turns with the pull across it; 0 if it need not
+    std::int16_t corner;  // of a rectangle, a bit for each axis that is negative; or of a polygon
+    double x, y;          // of a disc, the direction from its centre
+    double turning;       // by how much the force turns with the pull across it; 0 if it need not
 
     bool operator==(const Edge& other) const {
       return point == other.point && corner == other.corner && x == other.x && y == other.y;
@@ -75,7 +76,8 @@ class ConeProjection {
   };
   static constexpr int kEdges = 6;  // more do not make a wrench, but for one that is dropped
 
-  /// The edges that make up an answer, from which another may start.
+  /// The edges that make up an answer, from which another may start if sections have the same
+  /// shapes and numbers of corners.
   struct Answer {
     std::array<Edge, kEdges> edges;
     std::int8_t count = 0;
@@ -87,17 +89,16 @@ class ConeProjection {
   }
 
  private:
-  /// What turns found, to come back to.
+  /// An answer that Newton's method may have to come back to.
   struct State {
     std::array<Edge, kEdges> edges;
     std::array<double, kEdges> factors;
     int count;
   };
-  /// The edge that goes furthest along the residual of those that may be added, with point −1 if
-  /// none goes on; and whether edges may be turned that go on then.
   struct Search {
-    Edge best;
-    bool turns;
+    Edge best;  ///< that may be added, and goes furthest along the residual; point −1 if none does
+    double slope;  ///< of that
+    bool turns;    ///< whether edges come closer to the wrench if they turn
   };
 
   Vector6 direction(const Edge& edge) const;
@@ -108,6 +109,7 @@ class ConeProjection {
   void add(const Edge& edge, const Vector6& column);
   void drop(int position);
   bool solve();
+  bool exchange(double slope);
   void minimize();
   void begin();
   Search search(bool may_turn) const;

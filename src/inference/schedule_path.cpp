@@ -231,7 +231,7 @@ class PathFinder {
   const KnownContacts* const known_;
   const PathPieces pieces_;
   const Changes changes_;
-  std::vector<Section> friction_;  // of each point
+  std::vector<Section> friction_;        // of each point
   std::vector<std::vector<int>> limbs_;  // points of each
   std::vector<Mask> limb_masks_;
   ConeProjection projection_;

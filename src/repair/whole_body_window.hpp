@@ -103,7 +103,7 @@ class WholeBodyWindow {
   const RepairSettings& settings_;
   MotionLinearizer linearizer_;
   ConeProjection projection_;
-  const double of_place_;  // cost of the square of how far a point is from its place
+  const double of_place_;              // cost of the square of how far a point is from its place
   const std::vector<Section> shrunk_;  // F of each point, smaller by the margin
   Eigen::Index first_ = 0, behind_ = 0;
   std::vector<Constraint> constraints_;
