@@ -367,7 +367,8 @@ BOOST_AUTO_TEST_CASE(a_point_gives_what_lies_in_its_cone_and_nothing_of_what_pul
   const auto missing = [&](const Section& section, const Vector3d& force) {
     Vector6 wrench;
     wrench << force, lever.cross(force);
-    return ConeProjection(0.33).project(wrench, levers, {section}, 1);
+    ConeProjection projection(0.33, ConeProjection::kExact);
+    return projection.project(wrench, levers, {section}, 1);
   };
   const Section pyramid = Section::facets(0.5, 4), cone = Section::disc(0.5);
   BOOST_TEST(missing(pyramid, {0.5, -0.5, 1.}).force < 1e-9);

@@ -23,8 +23,9 @@ using Mask = std::uint32_t;
 struct Problem {
   /// @param is_calm  whether points stay where they are for some frames, so that what is cheapest
   ///                 in a frame is so in the next, too
+  /// @param on_cones  whether friction is the cone's, else the pyramid's
   Problem(Random& random, const std::vector<int>& given_limbs, Index given_frames,
-          bool is_calm = false)
+          bool is_calm = false, bool on_cones = false)
       : limbs(given_limbs), frames(given_frames) {
     time = VectorXd::Zero(frames);
     for (Index frame = 1; frame < frames; ++frame)
@@ -54,7 +55,7 @@ struct Problem {
         velocity[k].leftCols(half) *= 0.1;
       }
       const double mu = random.uniform(0.4, 1.);
-      friction.push_back(random.coin() ? Section::disc(mu) : Section::facets(mu, 4));
+      friction.push_back(on_cones ? Section::disc(mu) : Section::facets(mu, 4));
       // One of two rests, of which the second carries only now and then.
       Rests own;
       own.list = {{0, 2, 0., true}, {2, frames, random.uniform(-0.02, 0.02), random.coin()}};
@@ -300,6 +301,22 @@ BOOST_AUTO_TEST_CASE(the_path_is_the_cheapest_of_all_and_probabilities_are_sums_
   BOOST_TEST(off < kMean);
   BOOST_TEST(changes > 40);
   BOOST_TEST(unsure > 20);
+}
+
+BOOST_AUTO_TEST_CASE(on_cones_it_is_the_cheapest_but_for_what_projections_leave) {
+  Random random(11);
+  bool is_other = false;
+  for (int trial = 0; trial < 60; ++trial) {
+    Problem problem(random, {0, 0, 1}, 5, false, true);
+    problem.settings.change = random.uniform(0.1, 2.);
+    problem.force.topRows<2>() += 0.5 * kWeight * Eigen::Matrix2Xd::Ones(2, 5);  // that slip
+    const AllPaths all(problem);
+    BOOST_TEST(close(all.cost(problem.find().sets), all.least, 1e-3));
+    Problem on_pyramids = problem;
+    for (Section& section : on_pyramids.friction) section = Section::facets(section.radius(), 4);
+    is_other = is_other || AllPaths(on_pyramids).least < all.least - 0.01;
+  }
+  BOOST_TEST(is_other);
 }
 
 BOOST_AUTO_TEST_CASE(known_contacts_stay_and_only_their_points_are_found) {

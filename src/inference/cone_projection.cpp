@@ -275,10 +275,10 @@ ConeProjection::Search ConeProjection::search(bool may_turn) const {
   return found;
 }
 
-// Whether no edge pushes too much.
+// Whether no edge pushes too much or too little.
 bool ConeProjection::isBalanced() const {
   for (int k = 0; k < count_; ++k)
-    if (columns_.col(k).dot(residual_) < -negligible_) return false;
+    if (!(std::abs(columns_.col(k).dot(residual_)) <= negligible_)) return false;
   return true;
 }
 
