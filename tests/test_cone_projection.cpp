@@ -240,6 +240,30 @@ BOOST_AUTO_TEST_CASE(nothing_that_discs_and_polygons_give_is_closer) {
   BOOST_TEST(missed > 1000);
 }
 
+BOOST_AUTO_TEST_CASE(on_two_soles_that_slip_edges_are_all_but_dependent) {
+  Problem problem;
+  problem.scale = 1.;
+  problem.levers.resize(3, 8);
+  for (Index k = 0; k < 8; ++k)
+    problem.levers.col(k) << (k & 1 ? 0.1 : -0.1) + 1e-6 * double(k),
+        (k & 2 ? 0.05 : -0.05) + (k & 4 ? 0.1 : -0.1), -0.75;
+  problem.friction.assign(8, Section::disc(0.7));
+  ConeProjection warm(problem.scale, ConeProjection::kExact);
+  for (int trial = 0; trial < 3000; ++trial) {
+    // Pushed at a place of the ground, at which moments turn, too.
+    const double angle = 0.002 * trial;
+    const Vector3d place(0.1 * std::sin(3. * angle), 0.15 * std::sin(5. * angle), -0.75);
+    const Vector3d force(0.9 * std::sin(7. * angle), 0.9 * std::cos(11. * angle), 1.);
+    problem.wrench << force, place.cross(force);
+    problem.wrench[5] += 0.03 * std::sin(13. * angle);
+    ConeProjection cold(problem.scale, ConeProjection::kExact);
+    for (ConeProjection* projection : {&cold, &warm}) {
+      projection->project(problem.wrench, problem.levers, problem.friction, problem.all());
+      prove(problem, problem.all(), *projection, ConeProjection::kExact);
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(the_last_answer_changes_how_fast_it_is_and_not_what_is_found) {
   Random random(2);
   for (const bool is_disc : {false, true}) {

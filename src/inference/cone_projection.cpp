@@ -161,39 +161,39 @@ void ConeProjection::minimize() {
   std::copy_n(solution_.begin(), count_, factors_.begin());
 }
 
-// A wrench in the metric: multiplied by a square root of the inverse of
-// 1 + Σ turning (across)(across)ᵀ.
-ConeProjection::Vector6 ConeProjection::stretch(Vector6 wrench) const {
-  for (int k = 0; k < stretches_; ++k)
-    wrench -= parts_[k] * axes_.col(k).dot(wrench) * axes_.col(k);
+// A wrench in the metric H⁻¹, H = 1 + Σ turning T Tᵀ: multiplied by a root of that, one factor for
+// each edge that turns.
+ConeProjection::Vector6 ConeProjection::whiten(Vector6 wrench) const {
+  for (int k = 0; k < curvatures_; ++k)
+    wrench -= shrinkage_[k] * axes_.col(k).dot(wrench) * axes_.col(k);
   return wrench;
 }
 
-// Lets an edge turn.
-void ConeProjection::addStretch(const Edge& edge) {
+// Lets an edge turn: T is what its point does that pushes across it.
+void ConeProjection::addCurvature(const Edge& edge) {
   const Eigen::Vector3d across(-edge.y, edge.x, 0.), lever = levers_->col(edge.point);
   Vector6 axis;
   axis << across, lever.cross(across) / lever_;
-  axis = stretch(axis);
+  axis = whiten(axis);
   const double square = axis.squaredNorm();
   if (!(square > 0.)) return;
-  axes_.col(stretches_) = axis / std::sqrt(square);
-  parts_[stretches_] = 1. - 1. / std::sqrt(1. + edge.turning * square);
-  ++stretches_;
+  axes_.col(curvatures_) = axis / std::sqrt(square);
+  shrinkage_[curvatures_] = 1. - 1. / std::sqrt(1. + edge.turning * square);
+  ++curvatures_;
 }
 
 // Columns of the edges that there are, in the metric that there is, without those that are within
 // the span of others; and solves for their factors.
 void ConeProjection::assemble() {
   const Vector6 target = target_;
-  if (stretches_ > 0) target_ = stretch(target_);
+  if (curvatures_ > 0) target_ = whiten(target_);
   const int edges = std::exchange(count_, 0);
   decomposed_ = 0;
   for (int k = 0; k < edges; ++k) {
     const double factor = factors_[k];
     const Edge edge = edges_[k];
     const Vector6 column = direction(edge);
-    add(edge, stretches_ > 0 ? stretch(column) : column);
+    add(edge, curvatures_ > 0 ? whiten(column) : column);
     factors_[count_ - 1] = factor;
   }
   target_ = target;
@@ -203,11 +203,11 @@ void ConeProjection::assemble() {
 // Begins with what is left of the last answer, as far as its points are there and still push.
 void ConeProjection::begin() {
   const int edges = std::exchange(count_, 0);
-  stretches_ = 0;
+  curvatures_ = 0;
   for (int k = 0; k < edges; ++k) {
     if (!(set_ >> edges_[k].point & 1u)) continue;
     if (count_ < k) edges_[count_] = edges_[k];
-    if (edges_[count_].turning > 0.) addStretch(edges_[count_]);
+    if (edges_[count_].turning > 0.) addCurvature(edges_[count_]);
     ++count_;
   }
   assemble();
@@ -298,11 +298,10 @@ void ConeProjection::merge(int position, const Eigen::Vector3d& pull) {
   edge.y = sum.y();
 }
 
-// Which edges turn with the residual, and how much. The second derivative of half the square of the
-// distance by the force across an edge is that of the wrench, and the pull along the edge over what
-// it pushes along it.
+// The metric of Newton's method at the residual. An edge turns where its point has no other, which
+// would be inside of its cone, or has no other that is close to a pull that goes on.
 void ConeProjection::findTurns() {
-  stretches_ = 0;
+  curvatures_ = 0;
   for (int k = 0; k < count_; ++k) {
     Edge& edge = edges_[k];
     edge.turning = 0.;
@@ -320,16 +319,17 @@ void ConeProjection::findTurns() {
       merge(k, pulled);
     }
     edge.turning = factors_[k] * section.radius() / std::max(along(edge, pulled), negligible_);
-    if (edge.turning > 0.) addStretch(edge);
+    if (edge.turning > 0.) addCurvature(edge);
   }
 }
 
-// Turns edges by what the residual in the metric, which is that of the changes, says.
+// Newton's step for edges, whose factors are those of least squares in the metric: H⁻¹ times what
+// is left there pulls a force across each, by which it is turned.
 void ConeProjection::applyTurns() {
-  Vector6 residual = stretch(target_);
+  Vector6 residual = whiten(target_);
   for (int k = 0; k < count_; ++k) residual -= factors_[k] * columns_.col(k);
-  for (int k = stretches_ - 1; k >= 0; --k)
-    residual -= parts_[k] * axes_.col(k).dot(residual) * axes_.col(k);
+  for (int k = curvatures_ - 1; k >= 0; --k)
+    residual -= shrinkage_[k] * axes_.col(k).dot(residual) * axes_.col(k);
   for (int k = 0; k < count_; ++k) {
     Edge& edge = edges_[k];
     if (edge.turning > 0.) {
@@ -360,7 +360,7 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
   negligible_ = gain_ * size;
   useless_count_ = 0;
   begin();
-  bool is_turned = stretches_ > 0;  // so that factors are not those of least squares
+  bool is_turned = curvatures_ > 0;  // then, factors are not those of least squares
   if (is_turned) applyTurns();
 
   double least = std::numeric_limits<double>::infinity();  // square of the distance
@@ -382,6 +382,7 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
     const Search found = search(may_turn);
     if (is_turned && !found.turns && found.best.point < 0 && isBalanced()) break;
     if (may_turn && (found.turns || is_turned)) {
+      // A step of Newton's method, with what may be added from where it is right to go on.
       if (is_closer) closest = {edges_, factors_, count_};
       findTurns();
       if (is_closer && found.best.point >= 0 && count_ < kEdges) {
@@ -390,20 +391,21 @@ ConeProjection::Residual ConeProjection::project(const Vector6& wrench,
       }
       assemble();
       minimize();
-      if (stretches_ > 0) applyTurns();
+      if (curvatures_ > 0) applyTurns();
       is_turned = true;
     } else if (is_turned) {
-      // Back to where least squares with the edges as they are lead on.
+      // Least squares with the edges as they are lead on from the closest answer.
       if (!is_closer) {
         edges_ = closest.edges;
         factors_ = closest.factors;
         count_ = closest.count;
       }
-      stretches_ = 0;
+      curvatures_ = 0;
       assemble();
       minimize();
       is_turned = false;
     } else {
+      // A step of Lawson and Hanson's method.
       if (found.best.point < 0 || count_ == kEdges) break;
       add(found.best, direction(found.best));
       if (!solve() && !exchange(found.slope)) {

@@ -44,7 +44,7 @@ class ConeProjection {
   /// common.
   /// @param wrench    (force, moment) about some point
   /// @param levers    from that point to the points that may push
-  /// @param friction  F of each, which has the origin in it
+  /// @param friction  F of each
   /// @param set       a bit for each point that pushes, of which there are at most kMaximalPoints
   Residual project(const Vector6& wrench, const Eigen::Matrix3Xd& levers,
                    const std::vector<Section>& friction, std::uint32_t set);
@@ -103,8 +103,8 @@ class ConeProjection {
 
   Vector6 direction(const Edge& edge) const;
   Eigen::Vector3d pull(const Vector6& residual, int point) const;
-  Vector6 stretch(Vector6 wrench) const;
-  void addStretch(const Edge& edge);
+  Vector6 whiten(Vector6 wrench) const;
+  void addCurvature(const Edge& edge);
   void assemble();
   void add(const Edge& edge, const Vector6& column);
   void drop(int position);
@@ -136,11 +136,10 @@ class ConeProjection {
   int decomposed_ = 0;
   std::array<std::array<double, kEdges>, kEdges> L_;
   std::array<double, kEdges> inverse_, y_;
-  // The metric in which edges may turn: by how much wrenches are shorter along axes, one after
-  // another.
-  int stretches_ = 0;
+  // The metric in which edges turn: by which part wrenches shrink along axes, one after another.
+  int curvatures_ = 0;
   Eigen::Matrix<double, 6, kEdges> axes_;
-  std::array<double, kEdges> parts_;
+  std::array<double, kEdges> shrinkage_;
   // Edges that are within the span of those that push, although rounding says that they would help.
   static constexpr int kRounds = 60;
   std::array<Edge, kRounds> useless_;
