@@ -7,6 +7,7 @@
 
 #include "dynacom/contact_point.hpp"
 #include "inference/cone_projection.hpp"
+#include "repair/part_sets.hpp"
 
 namespace dynacom::internal {
 
@@ -77,6 +78,13 @@ std::vector<Eigen::Matrix3Xd> placePoints(const std::vector<std::vector<pinocchi
   return places;
 }
 
+// F of a link, by the model of the parts.
+Section findLinkFriction(const std::vector<FixedContact>& parts) {
+  const double mu = findBodyFriction(parts);
+  if (parts.empty()) return Section::disc(mu);
+  return dynamic_cast<const ContactPoint&>(*parts.front().contact).getSettings().makeFriction(mu);
+}
+
 }  // namespace
 
 std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion& motion,
@@ -87,10 +95,8 @@ std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion&
   const double weight = -question.parts.carrier.mass * question.parts.carrier.gravity.z();
   if (!(weight > 0.)) return seats;
   const std::vector<FixedContact>& points = question.parts.carrier.contacts;
-  std::vector<double> part_mu;
-  for (const FixedContact& part : points)
-    part_mu.push_back(dynamic_cast<const ContactPoint&>(*part.contact).getSettings().mu);
-  const double body_mu = findBodyFriction(points);
+  const std::vector<Section> of_parts = listFriction(question.parts);
+  const Section of_links = findLinkFriction(points);
 
   for (const Run& run : runs) {
     std::vector<Index> frames;
@@ -126,19 +132,19 @@ std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion&
         if (!question.missing[frame]) continue;
         ++looked_at;
         std::vector<Eigen::Vector3d> levers;
-        std::vector<double> mu;
+        std::vector<Section> friction;
         const Eigen::Vector3d com = question.analysis.com.col(frame);
-        for (std::size_t k = 0; k < part_mu.size(); ++k) {
+        for (std::size_t k = 0; k < of_parts.size(); ++k) {
           if (!question.schedule.active(Index(k), frame)) continue;
           levers.push_back(question.motions[k].position.col(frame) - com);
-          mu.push_back(part_mu[k]);
+          friction.push_back(of_parts[k]);
         }
         std::uint32_t seat = 0;
         for (const Index point : low) {
           if (levers.size() == ConeProjection::kMaximalPoints) break;
           seat |= std::uint32_t(1) << levers.size();
           levers.push_back(places[sample].col(point) - com);
-          mu.push_back(body_mu);
+          friction.push_back(of_links);
         }
         Eigen::Matrix3Xd all(3, Index(levers.size()));
         for (std::size_t k = 0; k < levers.size(); ++k) all.col(Index(k)) = levers[k];
@@ -146,7 +152,7 @@ std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion&
         wrench << question.analysis.ground_force.col(frame),
             question.analysis.ground_torque.col(frame);
         const auto set = static_cast<std::uint32_t>((std::uint64_t(1) << levers.size()) - 1);
-        const auto left = projection.project(wrench, all, mu, set);
+        const auto left = projection.project(wrench, all, friction, set);
         if (left.force <= settings.verdict.residual_force.limit * weight &&
             left.torque <= settings.verdict.residual_torque.limit * weight) {
           ++suffices;

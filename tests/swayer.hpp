@@ -15,7 +15,8 @@ namespace dynacom_tests {
 
 /// A body of 10 kg above two soles on massless legs, with an arm that turns.
 struct Swayer {
-  Swayer() {
+  explicit Swayer(dynacom::FrictionModel friction = dynacom::FrictionModel::OuterPyramid,
+                  double mu = 0.7) {
     model = singleBody(10., {});
     addFeet(model);
     const auto arm = model.addJoint(1, pinocchio::JointModelRY(),
@@ -24,8 +25,8 @@ struct Swayer {
                             SE3(Matrix3d::Identity(), Vector3d(0.3, 0., 0.)));
     robot.emplace(model);
     for (const char* name : {"left", "right"})
-      robot->addContact(makeSole(std::string(name) + "_foot"), name);
-    split.emplace(dynacom::splitContacts(*robot));
+      robot->addContact(makeSole(std::string(name) + "_foot", mu), name);
+    split.emplace(dynacom::splitContacts(*robot, {}, friction));
   }
 
   /// Stands with its feet side by side.

@@ -17,7 +17,8 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// A body on the corners of a rectangle, whose CoM goes where it is told.
 struct Stander {
-  explicit Stander(Index frames, double rate = 100.) {
+  explicit Stander(Index frames, double rate = 100.,
+                   FrictionModel friction = FrictionModel::OuterPyramid) {
     pinocchio::Model model = singleBody(kMass, {});
     std::vector<PartRobot::Part> list;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -32,7 +33,9 @@ struct Stander {
     dynamics.ground_torque.setZero(3, frames);
     schedule.active.setConstant(4, frames, true);
     for (std::size_t k = 0; k < 4; ++k) {
-      parts[0].robot.addContact(makePoint(list[k].name, kFriction), list[k].name);
+      ContactPointSettings point = makePoint(list[k].name, kFriction)->getSettings();
+      point.friction = friction;
+      parts[0].robot.addContact(std::make_shared<ContactPoint>(point), list[k].name);
       schedule.names.push_back(list[k].name);
       ContactMotion motion;
       motion.name = list[k].name;
@@ -65,8 +68,9 @@ CentroidalFilterSettings exactSettings() {
 }
 
 /// Sways, is pushed and turned, and is in the air for some frames.
-Stander makeSwaying(Index frames, unsigned seed) {
-  Stander stander(frames, 50.);
+Stander makeSwaying(Index frames, unsigned seed,
+                    FrictionModel friction = FrictionModel::OuterPyramid) {
+  Stander stander(frames, 50., friction);
   Random random(seed);
   const Vector3d push = random.vector3(0.2), turn = random.vector3(0.05);
   for (Index k = 0; k < frames; ++k) {
@@ -189,6 +193,36 @@ BOOST_AUTO_TEST_CASE(a_mirrored_motion_changes_mirrored) {
   moved.dynamics.com.colwise() += Vector3d(3., -2., 1.);
   for (ContactMotion& motion : moved.motions) motion.position.colwise() += Vector3d(3., -2., 1.);
   BOOST_TEST(close(moved.filter().com, found.com, 1e-6));
+}
+
+BOOST_AUTO_TEST_CASE(a_turned_motion_on_cones_changes_turned) {
+  // Pushed diagonally, through the middle of what it stands on, as pyramids allow and cones do not.
+  const auto makeSliding = [](FrictionModel friction) {
+    Stander stander(60, 50., friction);
+    for (Index k = 0; k < 60; ++k) {
+      const double push = 0.95 * kFriction * kWeight * std::sin(0.2 * double(k));
+      const Vector3d force(push, push, kWeight);
+      stander.dynamics.ground_force.col(k) = force;
+      stander.dynamics.ground_torque.col(k) = -stander.dynamics.com.col(k).cross(force);
+    }
+    return stander;
+  };
+  const Matrix3d about = Eigen::AngleAxisd(0.7, Vector3d::UnitZ()).toRotationMatrix();
+  const auto turn = [&](Stander stander) {
+    stander.dynamics.com = about * stander.dynamics.com;
+    stander.dynamics.ground_force = about * stander.dynamics.ground_force;
+    stander.dynamics.ground_torque = about * stander.dynamics.ground_torque;
+    for (ContactMotion& motion : stander.motions) motion.position = about * motion.position;
+    return stander;
+  };
+  const Stander cones = makeSliding(FrictionModel::Cone);
+  const Stander pyramids = makeSliding(FrictionModel::OuterPyramid);
+  BOOST_TEST(pyramids.filter().rms == 0.);
+  const CentroidalChange here = cones.filter(exactSettings());
+  const CentroidalChange turned = turn(cones).filter(exactSettings());
+  BOOST_TEST(here.converged);
+  BOOST_TEST(here.rms > 1e-3);
+  BOOST_TEST(close(turned.com, about * here.com, 1e-6));
 }
 
 BOOST_AUTO_TEST_CASE(nothing_is_asked_of_frames_that_are_free) {

@@ -43,6 +43,40 @@ BOOST_AUTO_TEST_CASE(who_sways_too_fast_is_held_back) {
   BOOST_TEST((again.motion.q == repaired.motion.q));
 }
 
+BOOST_AUTO_TEST_CASE(who_would_slip_does_not_on_exact_cones) {
+  const double mu = 0.1;
+  const Swayer exact(FrictionModel::Cone, mu), pyramids(FrictionModel::OuterPyramid, mu),
+      facets(FrictionModel::Facets, mu);
+  // Diagonally, where pyramids allow 41 % more.
+  Motion motion = exact.stand(120);
+  for (Index k = 0; k < 120; ++k) {
+    const double x = 0.05 * std::sin(6. * motion.time[k]);
+    for (const Index row : {0, 1}) {
+      motion.q(row, k) += x;
+      motion.q(7 + row, k) -= x;
+      motion.q(10 + row, k) -= x;
+    }
+  }
+  motion = differentiate(exact.model, motion.time, motion.q);
+  const ContactSchedule schedule = exact.schedule(120);
+  BOOST_TEST(exact.countUnsolved(motion, schedule) > 30);
+  const RepairedMotion repaired = repairMotion(*exact.split, motion, schedule);
+  BOOST_TEST(repaired.within_reach);
+  BOOST_TEST(exact.countUnsolved(repaired.motion, schedule) == 0);
+  BOOST_TEST(repaired.held_largest < 1e-3);
+  const RepairedMotion again = repairMotion(*exact.split, repaired.motion, schedule);
+  BOOST_TEST((again.motion.q == repaired.motion.q));
+  // Within pyramids, it is changed less, and slips in earnest.
+  const RepairedMotion outer = repairMotion(*pyramids.split, motion, schedule);
+  BOOST_TEST(outer.within_reach);
+  BOOST_TEST(pyramids.countUnsolved(outer.motion, schedule) == 0);
+  BOOST_TEST(exact.countUnsolved(outer.motion, schedule) > 10);
+  BOOST_TEST(outer.root_rms < repaired.root_rms);
+  const RepairedMotion of_facets = repairMotion(*facets.split, motion, schedule);
+  BOOST_TEST(of_facets.within_reach);
+  BOOST_TEST(facets.countUnsolved(of_facets.motion, schedule) == 0);
+}
+
 BOOST_AUTO_TEST_CASE(in_flight_the_com_follows_its_parabola) {
   const Swayer walker;
   Motion motion = walker.stand(60);

@@ -23,8 +23,9 @@ using Mask = std::uint32_t;
 struct Problem {
   /// @param is_calm  whether points stay where they are for some frames, so that what is cheapest
   ///                 in a frame is so in the next, too
+  /// @param on_cones  whether friction is the cone's, else the pyramid's
   Problem(Random& random, const std::vector<int>& given_limbs, Index given_frames,
-          bool is_calm = false)
+          bool is_calm = false, bool on_cones = false)
       : limbs(given_limbs), frames(given_frames) {
     time = VectorXd::Zero(frames);
     for (Index frame = 1; frame < frames; ++frame)
@@ -53,7 +54,8 @@ struct Problem {
         position[k].row(2).head(half).setZero();
         velocity[k].leftCols(half) *= 0.1;
       }
-      mu.push_back(random.uniform(0.4, 1.));
+      const double mu = random.uniform(0.4, 1.);
+      friction.push_back(on_cones ? Section::disc(mu) : Section::facets(mu, 4));
       // One of two rests, of which the second carries only now and then.
       Rests own;
       own.list = {{0, 2, 0., true}, {2, frames, random.uniform(-0.02, 0.02), random.coin()}};
@@ -67,7 +69,7 @@ struct Problem {
   SchedulePath find(const KnownContacts* known = nullptr, const PathPieces& pieces = {}) const {
     std::vector<PointTrack> points;
     for (std::size_t k = 0; k < limbs.size(); ++k)
-      points.push_back({limbs[k], mu[k], false, position[k], velocity[k]});
+      points.push_back({limbs[k], friction[k], false, position[k], velocity[k]});
     return findSchedulePath(points, rests, scales, {com, force, torque}, kWeight, time, settings,
                             known, pieces);
   }
@@ -77,7 +79,7 @@ struct Problem {
   VectorXd time;
   Eigen::Matrix3Xd com, force, torque;
   std::vector<Eigen::Matrix3Xd> position, velocity;
-  std::vector<double> mu;
+  std::vector<Section> friction;
   std::vector<Rests> rests;
   CostScales scales = {0.01, 0.1, 0.03, 0.01};
   DetectionSettings settings;
@@ -197,7 +199,7 @@ class AllPaths {
     Eigen::Matrix3Xd levers(3, Index(problem_.limbs.size()));
     for (std::size_t k = 0; k < problem_.limbs.size(); ++k)
       levers.col(Index(k)) = problem_.position[k].col(frame) - problem_.com.col(frame);
-    const auto missing = ConeProjection(s.lever).project(wrench, levers, problem_.mu, set);
+    const auto missing = ConeProjection(s.lever).project(wrench, levers, problem_.friction, set);
     const double force = missing.force / kWeight, torque = missing.torque / kWeight;
     sum += s.dynamics_weight *
            (std::min(force / problem_.scales.force + torque / problem_.scales.torque,
@@ -299,6 +301,22 @@ BOOST_AUTO_TEST_CASE(the_path_is_the_cheapest_of_all_and_probabilities_are_sums_
   BOOST_TEST(off < kMean);
   BOOST_TEST(changes > 40);
   BOOST_TEST(unsure > 20);
+}
+
+BOOST_AUTO_TEST_CASE(on_cones_it_is_the_cheapest_but_for_what_projections_leave) {
+  Random random(11);
+  bool is_other = false;
+  for (int trial = 0; trial < 60; ++trial) {
+    Problem problem(random, {0, 0, 1}, 5, false, true);
+    problem.settings.change = random.uniform(0.1, 2.);
+    problem.force.topRows<2>() += 0.5 * kWeight * Eigen::Matrix2Xd::Ones(2, 5);  // that slip
+    const AllPaths all(problem);
+    BOOST_TEST(close(all.cost(problem.find().sets), all.least, 1e-3));
+    Problem on_pyramids = problem;
+    for (Section& section : on_pyramids.friction) section = Section::facets(section.radius(), 4);
+    is_other = is_other || AllPaths(on_pyramids).least < all.least - 0.01;
+  }
+  BOOST_TEST(is_other);
 }
 
 BOOST_AUTO_TEST_CASE(known_contacts_stay_and_only_their_points_are_found) {

@@ -6,15 +6,20 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynacom/contact_set.hpp"
+
 namespace dynacom::internal {
 
 /// The wrench closest to a given one among those that points can give together, each of which
-/// pushes within the friction pyramid |f_x|, |f_y| ≤ μ f_z in the world's axes.
+/// pushes within its friction cone: f_z ≥ 0, (f_x, f_y) ∈ f_z F, in the world's axes.
 ///
-/// Such wrenches are sums of the pyramids' edges with factors ≥ 0, so that the closest one is a
+/// Such wrenches are sums of the cones' edges with factors ≥ 0, so that the closest one is a
 /// problem of non-negative least squares, solved by the active-set method of Lawson and Hanson
 /// (Solving Least Squares Problems, 1974, chapter 23). Of each point only that edge is looked at
-/// which goes furthest along the residual: its signs are those of the residual's pull on the point.
+/// which goes furthest along the residual's pull on the point: a corner of F or, of a disc, the
+/// point of its rim in the pull's direction. Since that turns with the residual, ever more edges of
+/// a disc would come ever closer to it. Newton's method turns those that there are; see
+/// docs/repair.md.
 class ConeProjection {
  public:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -39,10 +44,10 @@ class ConeProjection {
   /// common.
   /// @param wrench    (force, moment) about some point
   /// @param levers    from that point to the points that may push
-  /// @param mu        of each
+  /// @param friction  F of each
   /// @param set       a bit for each point that pushes, of which there are at most kMaximalPoints
   Residual project(const Vector6& wrench, const Eigen::Matrix3Xd& levers,
-                   const std::vector<double>& mu, std::uint32_t set);
+                   const std::vector<Section>& friction, std::uint32_t set);
 
   /// What of the wrench the last answer does not give, as the wrench was given.
   Vector6 residual() const {
@@ -58,17 +63,21 @@ class ConeProjection {
   /// The force of a point in the last answer; see lift().
   Eigen::Vector3d force(int point) const;
 
-  /// The edge of a pyramid, along which a point pushes.
+  /// The edge of a cone, along which a point pushes.
   struct Edge {
     std::int8_t point;
-    std::int8_t x, y;  // signs
+    std::int16_t corner;  // of a rectangle, a bit for each axis that is negative; or of a polygon
+    double x, y;          // of a disc, the direction from its centre
+    double turning;       // by how much the force turns with the pull across it; 0 if it need not
+
     bool operator==(const Edge& other) const {
-      return point == other.point && x == other.x && y == other.y;
+      return point == other.point && corner == other.corner && x == other.x && y == other.y;
     }
   };
   static constexpr int kEdges = 6;  // more do not make a wrench, but for one that is dropped
 
-  /// The edges that make up an answer, from which another may start.
+  /// The edges that make up an answer, from which another may start if sections have the same
+  /// shapes and numbers of corners.
   struct Answer {
     std::array<Edge, kEdges> edges;
     std::int8_t count = 0;
@@ -80,13 +89,41 @@ class ConeProjection {
   }
 
  private:
-  Vector6 direction(const Edge& edge, const Eigen::Matrix3Xd& levers,
-                    const std::vector<double>& mu) const;
+  /// An answer that Newton's method may have to come back to.
+  struct State {
+    std::array<Edge, kEdges> edges;
+    std::array<double, kEdges> factors;
+    int count;
+  };
+  struct Search {
+    Edge best;  ///< that may be added, and goes furthest along the residual; point −1 if none does
+    double slope;  ///< of that
+    bool turns;    ///< whether edges come closer to the wrench if they turn
+  };
+
+  Vector6 direction(const Edge& edge) const;
+  Eigen::Vector3d pull(const Vector6& residual, int point) const;
+  Vector6 whiten(Vector6 wrench) const;
+  void addCurvature(const Edge& edge);
+  void assemble();
   void add(const Edge& edge, const Vector6& column);
   void drop(int position);
   bool solve();
+  bool exchange(double slope);
+  void minimize();
+  void begin();
+  Search search(bool may_turn) const;
+  bool isUseless(const Edge& edge) const;
+  bool isBalanced() const;
+  void merge(int position, const Eigen::Vector3d& pull);
+  void findTurns();
+  void applyTurns();
 
   const double lever_, gain_;
+  const Eigen::Matrix3Xd* levers_ = nullptr;
+  const Section* friction_ = nullptr;
+  std::uint32_t set_ = 0;
+  double negligible_ = 0.;  // slope
   int count_ = 0;
   std::array<Edge, kEdges> edges_ = {};
   Eigen::Matrix<double, 6, kEdges> columns_;
@@ -99,6 +136,14 @@ class ConeProjection {
   int decomposed_ = 0;
   std::array<std::array<double, kEdges>, kEdges> L_;
   std::array<double, kEdges> inverse_, y_;
+  // The metric in which edges turn: by which part wrenches shrink along axes, one after another.
+  int curvatures_ = 0;
+  Eigen::Matrix<double, 6, kEdges> axes_;
+  std::array<double, kEdges> shrinkage_;
+  // Edges that are within the span of those that push, although rounding says that they would help.
+  static constexpr int kRounds = 60;
+  std::array<Edge, kRounds> useless_;
+  int useless_count_ = 0;
   Vector6 target_;
   Vector6 residual_ = Vector6::Zero();
 };

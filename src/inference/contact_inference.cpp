@@ -154,8 +154,10 @@ ContactInference internal::inferContacts(const ContactSplit& parts,
   const auto addTrack = [&](std::size_t k, const Eigen::Matrix3Xd& velocity) {
     const auto* contact =
         dynamic_cast<const ContactPoint*>(parts.carrier.contacts[k].contact.get());
-    tracks.push_back({parts.parts[k].limb, contact ? contact->getSettings().mu : 0.,
-                      parts.parts[k].contact >= contacts, motions[k].position, velocity});
+    const Section friction =
+        contact ? contact->getSettings().makeFriction(contact->getSettings().mu) : Section();
+    tracks.push_back({parts.parts[k].limb, friction, parts.parts[k].contact >= contacts,
+                      motions[k].position, velocity});
   };
   for (std::size_t k = 0; k < count; ++k) {
     for (const auto* values : {&motions[k].position, &motions[k].velocity})

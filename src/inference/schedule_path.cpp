@@ -141,7 +141,7 @@ class PathFinder {
     int limbs = 0;
     for (const PointTrack& point : points) {
       limbs = std::max(limbs, point.limb + 1);
-      mu_.push_back(point.mu);
+      friction_.push_back(point.friction);
     }
     limbs_.resize(static_cast<std::size_t>(limbs));
     limb_masks_.resize(limbs_.size(), 0);
@@ -231,7 +231,7 @@ class PathFinder {
   const KnownContacts* const known_;
   const PathPieces pieces_;
   const Changes changes_;
-  std::vector<double> mu_;
+  std::vector<Section> friction_;        // of each point
   std::vector<std::vector<int>> limbs_;  // points of each
   std::vector<Mask> limb_masks_;
   ConeProjection projection_;
@@ -372,7 +372,7 @@ Eigen::Vector2d PathFinder::findMissing(Index frame, Mask set) {
   placed_ = frame;
   ConeProjection::Vector6 wrench;
   wrench << wrench_.force.col(frame), wrench_.torque.col(frame);
-  const auto residual = projection_.project(wrench / weight_, levers_, mu_, set);
+  const auto residual = projection_.project(wrench / weight_, levers_, friction_, set);
   known.emplace_back(set, Eigen::Vector2d(residual.force, residual.torque));
   return known.back().second;
 }

@@ -90,7 +90,7 @@ CentroidalProblem describe(const internal::ContactSplit& parts,
   problem.gravity = internal::findUnitGravity(parts.carrier.gravity);
   problem.wrench /= parts.carrier.mass * problem.gravity;
   for (const ContactMotion& motion : motions) problem.points.push_back(&motion.position);
-  problem.mu = internal::listFriction(parts);
+  problem.friction = internal::listFriction(parts);
   problem.sets = internal::listSets(parts.parts, schedule, frames);
   problem.free = free;
   if (free.size() == 0) problem.free.setConstant(frames, false);
@@ -106,7 +106,7 @@ std::vector<Index> findOutOfReach(const CentroidalProblem& problem, double reach
     if (problem.free[frame]) continue;
     for (std::size_t k = 0; k < problem.points.size(); ++k)
       levers.col(Index(k)) = problem.points[k]->col(frame) - problem.com.col(frame);
-    const auto missing = projection.project(problem.wrench.col(frame), levers, problem.mu,
+    const auto missing = projection.project(problem.wrench.col(frame), levers, problem.friction,
                                             problem.sets[static_cast<std::size_t>(frame)]);
     if (std::max(missing.force, missing.torque) > reach) found.push_back(frame);
   }

@@ -207,7 +207,7 @@ void CentroidalWindow::project() {
         if (set >> point & 1u)
           levers_.col(Index(point)) = problem_.points[point]->col(frame) - problem_.com.col(frame);
       projection_.setAnswer(answers_[at(k)]);
-      projection_.project(target, levers_, problem_.mu, set);
+      projection_.project(target, levers_, problem_.friction, set);
       answers_[at(k)] = projection_.answer();
       dual_[at(k)] = projection_.residual();
     }

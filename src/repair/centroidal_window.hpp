@@ -18,7 +18,7 @@ struct CentroidalProblem {
   Eigen::Matrix3Xd com;
   Eigen::Matrix<double, 6, Eigen::Dynamic> wrench;  // about the CoM [m g, m g·m]
   std::vector<const Eigen::Matrix3Xd*> points;      // places of what may push, of each 3 × frames
-  std::vector<double> mu;                           // of each
+  std::vector<Section> friction;                    // F of each
   std::vector<std::uint32_t> sets;                  // of each frame: a bit for each that pushes
   Eigen::Array<bool, Eigen::Dynamic, 1> free;       // frames of which nothing is asked
 };

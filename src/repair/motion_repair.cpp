@@ -130,7 +130,7 @@ double measure(const WholeBodyProblem& problem, const Eigen::MatrixXd& ground,
     if (problem.free[frame]) continue;
     if (!needed.wrench.allFinite())
       internal::throwInvalid("motion: what frame ", frame, " needs is too large for numbers");
-    found.residual.col(frame) = findResidual(projection, needed, problem.mu, set);
+    found.residual.col(frame) = findResidual(projection, needed, problem.friction, set);
     worst = std::max(worst, found.residual.col(frame).norm());
   }
   return worst;

@@ -29,14 +29,28 @@ std::vector<std::uint32_t> listSets(const std::vector<PartRobot::Part>& parts,
   return sets;
 }
 
-std::vector<double> listFriction(const ContactSplit& parts) {
-  std::vector<double> mu;
+std::vector<Section> listFriction(const ContactSplit& parts) {
+  std::vector<Section> friction;
   for (const FixedContact& fixed : parts.carrier.contacts) {
     const auto* point = dynamic_cast<const ContactPoint*>(fixed.contact.get());
     if (!point) throwInvalid("part '", fixed.name, "' must be a ContactPoint");
-    mu.push_back(point->getSettings().mu);
+    const ContactPointSettings& settings = point->getSettings();
+    friction.push_back(settings.makeFriction(settings.mu));
   }
-  return mu;
+  return friction;
+}
+
+std::vector<Section> scale(const std::vector<Section>& friction, double factor) {
+  std::vector<Section> scaled;
+  for (const Section& section : friction) {
+    if (section.shape() == Section::Shape::Disc)
+      scaled.push_back(Section::disc(factor * section.radius()));
+    else if (section.shape() == Section::Shape::Polygon)
+      scaled.push_back(Section::polygon(factor * section.vertices()));
+    else
+      scaled.push_back(Section::rectangle(factor * section.lower(), factor * section.upper()));
+  }
+  return scaled;
 }
 
 }  // namespace dynacom::internal

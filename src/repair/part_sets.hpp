@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "../contact_split.hpp"
+#include "dynacom/contact_set.hpp"
 
 namespace dynacom::internal {
 
@@ -14,8 +15,11 @@ namespace dynacom::internal {
 std::vector<std::uint32_t> listSets(const std::vector<PartRobot::Part>& parts,
                                     const ContactSchedule& schedule, Eigen::Index frames);
 
-/// The friction of each part.
+/// F of each part.
 /// @throws std::invalid_argument if one is no ContactPoint
-std::vector<double> listFriction(const ContactSplit& parts);
+std::vector<Section> listFriction(const ContactSplit& parts);
+
+/// Sections as many times larger as the factor says, which is ≥ 0.
+std::vector<Section> scale(const std::vector<Section>& friction, double factor);
 
 }  // namespace dynacom::internal

@@ -9,6 +9,8 @@
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/spatial.hpp>
 
+#include "part_sets.hpp"
+
 namespace dynacom::internal {
 
 using Eigen::Index;
@@ -57,8 +59,8 @@ void forEachPoint(std::uint32_t set, Function act) {
 }  // namespace
 
 Eigen::Matrix<double, 6, 1> findResidual(ConeProjection& projection, const LinearizedFrame& linear,
-                                         const std::vector<double>& mu, std::uint32_t set) {
-  projection.project(linear.wrench, linear.points.colwise() - linear.com, mu, set);
+                                         const std::vector<Section>& friction, std::uint32_t set) {
+  projection.project(linear.wrench, linear.points.colwise() - linear.com, friction, set);
   return projection.residual();
 }
 
@@ -67,9 +69,8 @@ WholeBodyWindow::WholeBodyWindow(const WholeBodyProblem& problem, const RepairSe
       settings_(settings),
       linearizer_(problem.model, problem.points),
       projection_(kLever, ConeProjection::kExact),
-      of_place_(1. / (settings.held_point * settings.held_point)) {
-  for (const double mu : problem.mu) mu_.push_back(mu * (1. - settings.friction_margin));
-}
+      of_place_(1. / (settings.held_point * settings.held_point)),
+      shrunk_(scale(problem.friction, 1. - settings.friction_margin)) {}
 
 void WholeBodyWindow::solve(Index first, Index behind, Index asked, Eigen::MatrixXd& change,
                             Eigen::MatrixXd& q) {
@@ -145,7 +146,7 @@ double WholeBodyWindow::findMissingWrench(const Eigen::MatrixXd& q, Index frame)
   if (problem_.free[frame]) return 0.;
   linearizer_.evaluate(problem_.time, q, frame, evaluated_);
   const std::uint32_t set = problem_.sets[static_cast<std::size_t>(frame)];
-  return findResidual(projection_, evaluated_, problem_.mu, set).norm();
+  return findResidual(projection_, evaluated_, problem_.friction, set).norm();
 }
 
 void WholeBodyWindow::polish(Eigen::MatrixXd& change, Eigen::MatrixXd& q) {
@@ -219,7 +220,7 @@ double WholeBodyWindow::linearize(const Eigen::MatrixXd& q) {
     constraint.moved = linear.wrench;
     if (!problem_.free[frame]) {
       projection_.setAnswer(constraint.answer);
-      worst = std::max(worst, findResidual(projection_, linear, problem_.mu, set).norm());
+      worst = std::max(worst, findResidual(projection_, linear, problem_.friction, set).norm());
     }
     shrink(constraint);
   }
@@ -335,7 +336,7 @@ void WholeBodyWindow::shrink(Constraint& constraint) {
       linear.points.col(point) += std::min(settings_.support_margin / size, 1.) * inward;
   });
   projection_.setAnswer(constraint.answer);
-  findResidual(projection_, linear, mu_, set);
+  findResidual(projection_, linear, shrunk_, set);
   constraint.answer = projection_.answer();
   auto of_moment = linear.own(constraint.frame).derivative.bottomRows<3>();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -501,7 +502,7 @@ void WholeBodyWindow::project(bool relaxed) {
     if (set != 0) {
       const LinearizedFrame& linear = constraint.linear;
       projection_.setAnswer(constraint.answer);
-      projection_.project(target, linear.points.colwise() - linear.com, mu_, set);
+      projection_.project(target, linear.points.colwise() - linear.com, shrunk_, set);
       constraint.answer = projection_.answer();
       constraint.dual = projection_.residual();
     }

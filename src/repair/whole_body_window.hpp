@@ -17,7 +17,7 @@ namespace dynacom::internal {
 struct WholeBodyProblem {
   const pinocchio::Model& model;
   std::vector<BodyPoint> points;
-  std::vector<double> mu;  // of each point
+  std::vector<Section> friction;  // F of each point
   Eigen::VectorXd time;
   Eigen::MatrixXd q;                      // before, nq × frames
   std::vector<std::uint32_t> sets;        // of each frame: a bit for each point that pushes
@@ -103,8 +103,8 @@ class WholeBodyWindow {
   const RepairSettings& settings_;
   MotionLinearizer linearizer_;
   ConeProjection projection_;
-  const double of_place_;   // cost of the square of how far a point is from its place
-  std::vector<double> mu_;  // shrunk
+  const double of_place_;              // cost of the square of how far a point is from its place
+  const std::vector<Section> shrunk_;  // F of each point, smaller by the margin
   Eigen::Index first_ = 0, behind_ = 0;
   std::vector<Constraint> constraints_;
   std::vector<Pin> pins_;
@@ -117,6 +117,6 @@ class WholeBodyWindow {
 
 /// What points cannot give of a wrench over the weight, by a projection on what they can.
 Eigen::Matrix<double, 6, 1> findResidual(ConeProjection& projection, const LinearizedFrame& linear,
-                                         const std::vector<double>& mu, std::uint32_t set);
+                                         const std::vector<Section>& friction, std::uint32_t set);
 
 }  // namespace dynacom::internal
