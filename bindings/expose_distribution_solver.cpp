@@ -199,19 +199,15 @@ void exposeDistributionSolver() {
           "set, or where the wrench is out of reach, on the face of that in which\n"
           "NE' D^2 residual · lambda is largest; (29).")
       .add_property("bounds", &getBounds,
-                    "Of each contact and component the bound that it is at, -1 or 1, or 0, (3,) or
-                    "
-                    "(6,) of integers: of f_z its own bounds, of others those that grow with it. Of
-                    "
+                    "Of each contact and component the bound that it is at, -1 or 1, or 0, (3,) or\n"
+                    "(6,) of integers: of f_z its own bounds, of others those that grow with it. Of\n"
                     "sections that are no rectangles both components are 1 on the boundary.")
       .def_readonly("iterations", &Solution::iterations, "Steps of Newton's method.")
       .def_readonly("iterations_in_vain", &Solution::iterations_in_vain,
                     "How many of these were tried from the last answer, and led nowhere.")
       .def_readonly("is_accurate", &Solution::is_accurate,
-                    "Whether the answer has all digits that doubles have: not where only the
-                    "
-                    "proximal point method has led to it, and, of Relaxed ones, next to the boundary
-                    "
+                    "Whether the answer has all digits that doubles have: not where only the\n"
+                    "proximal point method has led to it, and, of Relaxed ones, next to the boundary\n"
                     "and where rounding decides what the residual exposes.")
       .def("isOptimal", &Solution::isOptimal,
            (bp::arg("self"), bp::arg("problem"), bp::arg("tolerance") = 1e-6),
