@@ -341,6 +341,7 @@ struct DistributionSolver::Workspace {
   double enough() const { return std::max(may_lack, kRounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
+  bool isReachedWithoutSlack();
   bool relax(const Vector6& start, bool is_certain = true);
   bool spanFaces(bool is_certain, Matrix6& basis, int& rank, Vector6& fixed);
   bool findResidual(bool is_certain, Matrix6& outside);
@@ -517,6 +518,7 @@ DistributionStatus DistributionSolver::Workspace::search() {
     descend(all, slack, centre, kMaximalSteps);
     const Vector6 lacking = missing();
     const double size = lacking.norm();
+    if (size <= kReach && isReachedWithoutSlack()) return DistributionStatus::Solved;
     if (size <= enough()) return DistributionStatus::Solved;
     // What stays is out of reach, if it proves so.
     const bool stays = (lacking - former_missing).norm() <= 0.1 * size;
@@ -532,6 +534,15 @@ DistributionStatus DistributionSolver::Workspace::search() {
   }
   return missing().norm() <= kReach ? DistributionStatus::Solved
                                     : DistributionStatus::NumericalFailure;
+}
+
+// Next to the answer, Newton's method without slack has all digits. Returns whether it is there, or
+// leaves the multipliers where they are.
+bool DistributionSolver::Workspace::isReachedWithoutSlack() {
+  const Vector6 kept = multipliers;
+  is_accurate = descend(&Block::set, 0., kept, kFreeSteps);
+  if (!is_accurate) evaluate(kept, &Block::set);
+  return is_accurate;
 }
 
 // An orthonormal basis of the wrenches that the faces span, and the wrench that all forces in them
@@ -557,7 +568,7 @@ bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, i
 //
 // @param outside  the projector on what they do not span
 bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outside) {
-  bool is_found = false;
+  bool is_found = false, is_near = false;
   for (int step = 0; step < kResidualSteps && !is_found; ++step) {
     Matrix6 bend = Matrix6::Zero();
     bool is_bent = false;
@@ -590,7 +601,9 @@ bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outsi
       const Eigen::LDLT<Square> along(Square(spanned.transpose() * bent));
       residual -= bent * along.solve(spanned.transpose() * residual);
     }
-    is_found = (residual - former).norm() <= kMissing;
+    // One step more than it takes: where a disc is hardly pulled, its point has few digits else.
+    is_found = is_near;
+    is_near = (residual - former).norm() <= kMissing;
   }
   const double size = residual.norm();
   if (!is_found || !(size > kReach) || !std::isfinite(size)) return false;
@@ -742,7 +755,9 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
     solution.status = work.search();
   }
   solution.iterations_in_vain = work.iterations_in_vain;
+  // An answer that the last one's multipliers lead to takes none; it counts as one all the same.
   solution.iterations = work.iterations + work.iterations_in_vain;
+  if (contacts > 0 && scale > 0.) solution.iterations = std::max(1, solution.iterations);
   solution.is_accurate = work.is_accurate;
   const bool answered = contacts > 0 && scale > 0. &&
                         (solution.status == DistributionStatus::Solved ||
