@@ -19,9 +19,9 @@ Eigen::VectorXd toForce(const char* name, const bp::object& values, const Contac
   return numbers;
 }
 
-template <Eigen::VectorXd Contact::*member>
+template <Problem::Components Contact::*member>
 bp::object getForce(const Contact& self) {
-  return (self.*member).size() == 0 ? bp::object() : bp::object(self.*member);
+  return (self.*member).size() == 0 ? bp::object() : bp::object(Eigen::VectorXd(self.*member));
 }
 
 Eigen::Matrix3d toRotation(const bp::object& rows) {
@@ -83,7 +83,9 @@ Solution solve(DistributionSolver& self, const Problem& problem) {
   return self.solve(problem);
 }
 
-bp::list getForces(const Solution& self) { return toList(self.forces); }
+bp::list getForces(const Solution& self) {
+  return toList(std::vector<Eigen::VectorXd>(self.forces.begin(), self.forces.end()));
+}
 
 bp::list getBounds(const Solution& self) {
   bp::list all;
@@ -99,8 +101,9 @@ std::string writeContact(const Contact& contact) {
   for (Eigen::Index k = 0; k < 3; ++k)
     text += (k > 0 ? ", " : "") + toText(contact.rotation.row(k).transpose());
   text += internal::concat("], lever=", toText(contact.lever));
-  if (contact.weights.size() > 0) text += ", weights=" + toText(contact.weights);
-  if (contact.reference.size() > 0) text += ", reference=" + toText(contact.reference);
+  if (contact.weights.size() > 0) text += ", weights=" + toText(Eigen::VectorXd(contact.weights));
+  if (contact.reference.size() > 0)
+    text += ", reference=" + toText(Eigen::VectorXd(contact.reference));
   return text + ")";
 }
 
@@ -113,8 +116,8 @@ std::string writeProblem(const Problem& problem) {
 
 std::string writeSolution(const Solution& solution) {
   std::string forces;
-  for (const Eigen::VectorXd& force : solution.forces)
-    forces += (forces.empty() ? "" : ", ") + toText(force);
+  for (const auto& force : solution.forces)
+    forces += (forces.empty() ? "" : ", ") + toText(Eigen::VectorXd(force));
   return internal::concat("DistributionSolution(status=", solution.status,
                           ", achieved=", toText(solution.achieved),
                           ", residual=", toText(solution.residual), ", cost=", solution.cost,
@@ -198,17 +201,19 @@ void exposeDistributionSolver() {
           "lambda is the projection of lambda_0 + W^-2 NE' nu, in the metric of W, on its\n"
           "set, or where the wrench is out of reach, on the face of that in which\n"
           "NE' D^2 residual · lambda is largest; (29).")
-      .add_property("bounds", &getBounds,
-                    "Of each contact and component the bound that it is at, -1 or 1, or 0, (3,) or\n"
-                    "(6,) of integers: of f_z its own bounds, of others those that grow with it. Of\n"
-                    "sections that are no rectangles both components are 1 on the boundary.")
+      .add_property(
+          "bounds", &getBounds,
+          "Of each contact and component the bound that it is at, -1 or 1, or 0, (3,) or\n"
+          "(6,) of integers: of f_z its own bounds, of others those that grow with it. Of\n"
+          "sections that are no rectangles both components are 1 on the boundary.")
       .def_readonly("iterations", &Solution::iterations, "Steps of Newton's method.")
       .def_readonly("iterations_in_vain", &Solution::iterations_in_vain,
                     "How many of these were tried from the last answer, and led nowhere.")
-      .def_readonly("is_accurate", &Solution::is_accurate,
-                    "Whether the answer has all digits that doubles have: not where only the\n"
-                    "proximal point method has led to it, and, of Relaxed ones, next to the boundary\n"
-                    "and where rounding decides what the residual exposes.")
+      .def_readonly(
+          "is_accurate", &Solution::is_accurate,
+          "Whether the answer has all digits that doubles have: not where only the\n"
+          "proximal point method has led to it, and, of Relaxed ones, next to the boundary\n"
+          "and where rounding decides what the residual exposes.")
       .def("isOptimal", &Solution::isOptimal,
            (bp::arg("self"), bp::arg("problem"), bp::arg("tolerance") = 1e-6),
            "Whether this is the answer to a problem, judged by nothing but both: forces in their\n"

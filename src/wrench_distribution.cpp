@@ -463,6 +463,7 @@ void WrenchDistribution::Workspace::reserve() {
   solved.reserve(slots.size());
   result.contacts.reserve(slots.size());
   problem.contacts.reserve(slots.size());
+  sets.reserve(slots.size());
   solver.reserve(slots.size(), rows, cols, all_rows, all_cols);
   accurate_solver.reserve(slots.size(), rows, cols, all_rows, all_cols);
 }

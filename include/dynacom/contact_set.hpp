@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <iosfwd>
 #include <limits>
+#include <memory>
 #include <string>
 
 #include "dynacom/export.hpp"
@@ -41,7 +42,7 @@ class DYNACOM_EXPORT Section {
   /// Of a disc; else 0.
   double radius() const { return radius_; }
   /// Of a polygon, two at least, counter-clockwise, 2 × vertices; else none.
-  const Eigen::Matrix2Xd& vertices() const { return vertices_; }
+  const Eigen::Matrix2Xd& vertices() const;
 
   /// The largest value of ⟨direction, p⟩ for points p of the section: its support function.
   double support(const Eigen::Vector2d& direction) const;
@@ -59,7 +60,7 @@ class DYNACOM_EXPORT Section {
   Shape shape_ = Shape::Rectangle;
   Eigen::Vector2d lower_ = Eigen::Vector2d::Zero(), upper_ = Eigen::Vector2d::Zero();
   double radius_ = 0.;
-  Eigen::Matrix2Xd vertices_ = Eigen::Matrix2Xd(2, 0);
+  std::shared_ptr<const Eigen::Matrix2Xd> vertices_;  // of a polygon; copies allocate nothing
 };
 
 /// The convex set of the forces λ that a contact can give, in its surface's frame: of points

@@ -22,20 +22,22 @@ namespace dynacom {
 /// CoM in the world's axes, forces λ_k in the frame of the contact's surface.
 struct DYNACOM_EXPORT DistributionProblem {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
+  /// Of three components or six, which allocates nothing.
+  using Components = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;
 
   struct DYNACOM_EXPORT Contact {
     ContactSet set;  ///< S
     /// Of the surface, in the world; its columns are the surface's axes.
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Eigen::Vector3d lever = Eigen::Vector3d::Zero();  ///< from the CoM to the surface's origin [m]
-    Eigen::VectorXd weights;    ///< the diagonal of W, > 0, set.size(); 1 if empty
-    Eigen::VectorXd reference;  ///< λ₀, set.size(); 0 if empty
+    Components weights;    ///< the diagonal of W, > 0, set.size(); 1 if empty
+    Components reference;  ///< λ₀, set.size(); 0 if empty
 
     /// @param prefix  of names in messages
     /// @throws std::invalid_argument naming what is not finite, or of another size or range
     void validate(const std::string& prefix = "") const;
     /// Takes λ to the wrench about the CoM: [R 0; [p]×R R], of points its first three columns.
-    Eigen::Matrix<double, 6, Eigen::Dynamic> NE() const;
+    Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 6> NE() const;
   };
 
   std::vector<Contact> contacts;
@@ -55,10 +57,10 @@ struct DYNACOM_EXPORT DistributionSolution {
   using Vector6 = DistributionProblem::Vector6;
 
   DistributionStatus status = DistributionStatus::NoContact;
-  std::vector<Eigen::VectorXd> forces;  ///< λ of each contact
-  Vector6 achieved = Vector6::Zero();   ///< Σ NE λ
-  Vector6 residual = Vector6::Zero();   ///< w − achieved
-  double cost = 0.;                     ///< ½ Σ ‖W (λ − λ₀)‖²
+  std::vector<DistributionProblem::Components> forces;  ///< λ of each contact
+  Vector6 achieved = Vector6::Zero();                   ///< Σ NE λ
+  Vector6 residual = Vector6::Zero();                   ///< w − achieved
+  double cost = 0.;                                     ///< ½ Σ ‖W (λ − λ₀)‖²
   /// ν of NE λ = achieved in the minimum of the cost: each λ is the projection of λ₀ + W⁻² NEᵀ ν,
   /// in the metric of W, on its set, or where the wrench is out of reach, on the face of that in
   /// which NEᵀ D² residual · λ is largest.
@@ -106,6 +108,9 @@ class DYNACOM_EXPORT DistributionSolver {
   /// Whether the search begins with the multipliers of the last answer, as is the default, if it
   /// was for as many contacts.
   void setWarmStart(bool warm_start);
+
+  /// Gets storage for problems of so many contacts.
+  void reserve(std::size_t contacts);
 
   /// Forgets the last answer: what comes next does not depend on it.
   void forget();

@@ -86,8 +86,9 @@ Section Section::polygon(const Eigen::Ref<const Eigen::Matrix2Xd>& points) {
        }));
   if (is_rectangle) return section;
   section.shape_ = Shape::Polygon;
-  section.vertices_.resize(2, Index(hull.size()));
-  for (std::size_t k = 0; k < hull.size(); ++k) section.vertices_.col(Index(k)) = hull[k];
+  Eigen::Matrix2Xd vertices(2, Index(hull.size()));
+  for (std::size_t k = 0; k < hull.size(); ++k) vertices.col(Index(k)) = hull[k];
+  section.vertices_ = std::make_shared<const Eigen::Matrix2Xd>(std::move(vertices));
   return section;
 }
 
@@ -115,21 +116,27 @@ double Section::support(const Vector2d& direction) const {
     case Shape::Disc:
       return radius_ * direction.norm();
     case Shape::Polygon:
-      return (direction.transpose() * vertices_).maxCoeff();
+      return (direction.transpose() * vertices()).maxCoeff();
     case Shape::Rectangle:
       break;
   }
   return direction.cwiseProduct(lower_).cwiseMax(direction.cwiseProduct(upper_)).sum();
 }
 
+const Eigen::Matrix2Xd& Section::vertices() const {
+  static const Eigen::Matrix2Xd none(2, 0);
+  return vertices_ ? *vertices_ : none;
+}
+
 double Section::excess(const Vector2d& point, double normal_force) const {
   if (shape_ == Shape::Disc) return point.norm() - radius_ * normal_force;
   double most = std::max((point - normal_force * upper_).maxCoeff(),
                          (normal_force * lower_ - point).maxCoeff());
-  for (Index k = 0; k < vertices_.cols(); ++k) {
-    const Vector2d edge = vertices_.col((k + 1) % vertices_.cols()) - vertices_.col(k);
+  const Eigen::Matrix2Xd& corners = vertices();
+  for (Index k = 0; k < corners.cols(); ++k) {
+    const Vector2d edge = corners.col((k + 1) % corners.cols()) - corners.col(k);
     const Vector2d outward = Vector2d(edge.y(), -edge.x()).normalized();
-    most = std::max(most, outward.dot(point - normal_force * vertices_.col(k)));
+    most = std::max(most, outward.dot(point - normal_force * corners.col(k)));
   }
   return most;
 }
@@ -138,8 +145,9 @@ std::string Section::to_string() const { return internal::concat(*this); }
 
 bool Section::operator==(const Section& other) const {
   return shape_ == other.shape_ && lower_ == other.lower_ && upper_ == other.upper_ &&
-         radius_ == other.radius_ && vertices_.cols() == other.vertices_.cols() &&
-         vertices_ == other.vertices_;
+         radius_ == other.radius_ &&
+         (vertices_ == other.vertices_ ||
+          (vertices().cols() == other.vertices().cols() && vertices() == other.vertices()));
 }
 
 ContactSet ContactSet::point(const Section& friction) {

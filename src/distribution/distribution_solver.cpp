@@ -192,9 +192,10 @@ struct Block {
 
 }  // namespace
 
-Eigen::Matrix<double, 6, Eigen::Dynamic> DistributionProblem::Contact::NE() const {
-  Eigen::Matrix<double, 6, Eigen::Dynamic> matrix =
-      Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, set.size());
+Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 6> DistributionProblem::Contact::NE()
+    const {
+  Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 6> matrix;
+  matrix.setZero(6, set.size());
   matrix.topLeftCorner<3, 3>() = rotation;
   matrix.bottomLeftCorner<3, 3>() = skew(lever) * rotation;
   if (set.size() == 6) matrix.bottomRightCorner<3, 3>() = rotation;
@@ -213,7 +214,7 @@ void DistributionProblem::validate() const {
 
 void DistributionProblem::Contact::validate(const std::string& prefix) const {
   const auto name = [&](const char* field) { return prefix + field; };
-  const auto require = [&](const char* field, const Eigen::VectorXd& values) {
+  const auto require = [&](const char* field, const Components& values) {
     if (values.size() != 0)
       internal::requireSize(name(field).c_str(), values.size(), set.size(), "components (or none)");
   };
@@ -242,6 +243,7 @@ double DistributionProblem::scale() const {
 }
 
 bool DistributionSolution::isOptimal(const DistributionProblem& problem, double tolerance) const {
+  using Components = DistributionProblem::Components;
   const double scale = problem.scale();
   const Vector6& D = problem.wrench_weights;
   const double size = D.cwiseProduct(residual).norm();
@@ -260,21 +262,21 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
   double gap = 0., distance_gap = 0., all_costs = 0.;
   for (std::size_t k = 0; k < forces.size(); ++k) {
     const DistributionProblem::Contact& contact = problem.contacts[k];
-    const Eigen::VectorXd& force = forces[k];
+    const Components& force = forces[k];
     const Index n = contact.set.size();
     if (force.size() != n || !force.allFinite()) return false;
-    const Eigen::VectorXd weights =
-        contact.weights.size() > 0 ? contact.weights : Eigen::VectorXd::Ones(n);
-    const Eigen::VectorXd reference =
-        contact.reference.size() > 0 ? contact.reference : Eigen::VectorXd::Zero(n);
+    const Components weights =
+        contact.weights.size() > 0 ? contact.weights : Components(Components::Ones(n));
+    const Components reference =
+        contact.reference.size() > 0 ? contact.reference : Components(Components::Zero(n));
     const auto NE = contact.NE();
     given += NE * force;
     const double force_size = std::max(unit, force.lpNorm<Eigen::Infinity>());
     if (!(contact.set.excess(force) <= tolerance * force_size)) return false;
 
     // Nothing is farther in the direction of the residual, and of what is as far, nothing cheaper.
-    const Eigen::VectorXd pull = NE.transpose() * direction;
-    const Eigen::VectorXd gradient =
+    const Components pull = NE.transpose() * direction;
+    const Components gradient =
         weights.cwiseAbs2().cwiseProduct(force - reference) - NE.transpose() * multipliers;
     ScaledSet face(contact.set, Vector6::Ones());
     face.setUnit(contact.set, Vector6::Ones(), 1.);
@@ -723,6 +725,13 @@ void DistributionSolver::setMaximalIterations(int maximal_iterations) {
 
 void DistributionSolver::setWarmStart(bool warm_start) { work_->warm_start = warm_start; }
 
+void DistributionSolver::reserve(std::size_t contacts) {
+  work_->blocks.reserve(contacts);
+  work_->directions.reserve(6 * contacts);
+  work_->solution.forces.reserve(contacts);
+  work_->solution.bounds.reserve(contacts);
+}
+
 void DistributionSolver::forget() { work_->has_answer = false; }
 
 const DistributionSolution& DistributionSolver::solution() const { return work_->solution; }
@@ -770,7 +779,7 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   if (answered)
     solution.multipliers = unit * largest * largest * work.weights.cwiseProduct(work.multipliers);
   for (std::size_t k = 0; k < contacts; ++k) {
-    Eigen::VectorXd& force = solution.forces[k];
+    DistributionProblem::Components& force = solution.forces[k];
     force.setZero(problem.contacts[k].set.size());
     solution.bounds[k].setZero();
     if (!answered) continue;
