@@ -24,6 +24,9 @@ def test_there_are_examples():
         "04_motion",
         "05_many_motions",
         "06_repair",
+        "07_exact_cone",
+        "08_hand_on_a_rail",
+        "09_slope",
     ]
 
 
