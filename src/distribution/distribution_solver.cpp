@@ -29,44 +29,43 @@ using Vector6 = DistributionProblem::Vector6;
 
 namespace {
 
-// These are for a problem whose weighted wrench has unit size.
+// For a problem whose weighted wrench has unit size. Each stands for one thing.
+struct Tolerances {
+  // A wrench no farther than this from what contacts can give is within reach: that is the
+  // manual's, and what a controller can tell.
+  static constexpr double reach = 1e-8;
+  // What an answer may lack: what forces of doubles lose by levers and weights of a few decades.
+  static constexpr double missing = 1e-12;
+  // By how many units in the last place of its terms a sum of some ten may be off.
+  static constexpr double rounding = 8. * std::numeric_limits<double>::epsilon();
 
-// A wrench no farther than this from what the contacts can give is within reach.
-constexpr double kReach = 1e-8;
-// What an answer may lack.
-constexpr double kMissing = 1e-12;
-// How many units in the last place of its terms a sum may be off.
-constexpr double kRounding = 8. * std::numeric_limits<double>::epsilon();
-// Along a step, what part of the slope at its start is as good as none, and by which part of what
-// the slope promises the dual has to fall at least (Armijo).
-constexpr double kFlat = 0.6, kArmijo = 1e-4;
-// For which ratio of two lengths their middle is the geometric one.
-constexpr double kFarApart = 4.;
-constexpr int kMaximalCuts = 40, kMaximalSteps = 60;
-// What part of the largest pivot of the compliance the least must be for a step without slack.
-constexpr double kFullRank = 1e-9;
-// How many steps are tried without slack, from all forces inside and from the last answer.
-constexpr int kFreeSteps = 2, kWarmSteps = 2;
-// The slack of the proximal point method, over the mean compliance: the first, the least, by which
-// it falls where the residual falls less than fivefold, and how many.
-constexpr double kFirstSlack = 1e-4, kLeastSlack = 1e-14, kSlackFactor = 0.05, kFall = 0.2;
-constexpr int kMaximalRounds = 40;
-// On faces, and how often it may fall there until the faces are the wrong ones.
-constexpr double kFaceSlack = 1e-5;
-constexpr int kSlowRounds = 4;
-// Of a direction that faces span, what remains outside of the others: more than the first, it is
-// one of its own, less than the second, it is rounding.
-constexpr double kIndependent = 1e-6, kDependent = 1e-11;
-// What faces that hardly span a direction may leave of the wrench: contacts on a line but for what
-// a model's numbers are off.
-constexpr double kHardlySpanned = 1e-9;
-// Of the residual, a component that exposes a face.
-constexpr double kExposed = 1e-9;
-// One that surely does not, and one that surely does, beyond rounding; and how far the closest
-// wrench has to be away, times the ratio of wrench weights, so that its direction has digits
-// enough.
-constexpr double kSurelyNone = 1e-12, kSurelyExposed = 1e-8, kFar = 1e-4;
-constexpr int kResidualSteps = 20;
+  // Along a step, what part of the slope at its start is as good as none; by which part of what the
+  // slope promises the dual has to fall (Armijo 1966); how often a step may be cut, and how many
+  // steps there may be: far more than any problem has taken.
+  static constexpr double flat = 0.6, armijo = 1e-4;
+  static constexpr int cuts = 40, steps = 60;
+  // How many steps are tried without slack: nearly all wrenches within reach take one or two.
+  static constexpr int direct_steps = 2;
+  // What part of the largest pivot of the compliance the least must be for that: more digits than
+  // this leaves are lost.
+  static constexpr double full_rank = 1e-9;
+
+  // The slack of the proximal point method, over the mean compliance: the first, which few steps
+  // lead to and from which faces are known; the least, rounding; by which it falls where the
+  // residual falls less than fivefold; for how many rounds, and for how many that are slow on
+  // faces.
+  static constexpr double first_slack = 1e-4, least_slack = 1e-14, slack_factor = 0.05, fall = 0.2;
+  static constexpr int rounds = 40, slow_rounds = 4;
+
+  // Of a direction that faces span, what remains outside of the others: more than the first, it is
+  // one of its own, less than the second, it is rounding.
+  static constexpr double independent = 1e-6, dependent = 1e-11;
+  // Of the residual, a component that exposes a face.
+  static constexpr double exposed = 1e-9;
+  // How far the closest wrench has to be away, times the ratio of wrench weights, so that its
+  // direction has digits enough.
+  static constexpr double far = 1e-4;
+};
 
 double normOf(const Vector6& wrench) {
   const double norm = wrench.norm();
@@ -178,7 +177,7 @@ struct Block {
   // the cost.
   Vector6 decidingPull(const Vector6& residual) const {
     const Vector6 of_distance = pullOf(residual);
-    const Vector6 rounding = kExposed * residual.norm() * reach();
+    const Vector6 rounding = Tolerances::exposed * residual.norm() * reach();
     return (of_distance.array().abs() > rounding.array()).select(of_distance, pull);
   }
 
@@ -248,12 +247,12 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
   const Vector6& D = problem.wrench_weights;
   const double size = D.cwiseProduct(residual).norm();
   if (status == DistributionStatus::NoContact)
-    return problem.contacts.empty() && size > kReach * scale;
+    return problem.contacts.empty() && size > Tolerances::reach * scale;
   const bool relaxed = status == DistributionStatus::Relaxed;
   if (status != DistributionStatus::Solved && !relaxed) return false;
   if (forces.size() != problem.contacts.size()) return false;
-  if (relaxed ? !(size >= kReach * scale * (1. - tolerance))
-              : !(size <= kReach * scale * (1. + tolerance)))
+  if (relaxed ? !(size >= Tolerances::reach * scale * (1. - tolerance))
+              : !(size <= Tolerances::reach * scale * (1. + tolerance)))
     return false;
 
   const double unit = scale > 0. ? scale / D.maxCoeff() : 1.;
@@ -287,8 +286,8 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
     if (relaxed) {
       // Components of the residual that expose a face are more than it may be off.
       Vector6 rounding = Vector6::Zero();
-      rounding.head(n) = std::max(kExposed, 10. * kMissing * scale / size) * direction.norm() *
-                         NE.colwise().norm().transpose();
+      rounding.head(n) = std::max(Tolerances::exposed, 10. * Tolerances::missing * scale / size) *
+                         direction.norm() * NE.colwise().norm().transpose();
       distance_gap += std::max(0., face.support(own, rounding) - own.dot(at));
       ScaledSet exposed;
       if (!face.expose(own, rounding, exposed)) return false;
@@ -321,7 +320,7 @@ struct DistributionSolver::Workspace {
   // Of the multipliers at hand.
   Vector6 multipliers = Vector6::Zero(), achieved = Vector6::Zero();
   double terms = 0.;  // what the achieved wrench is a sum of
-  double may_lack = kMissing;
+  double may_lack = Tolerances::missing;
   double value = 0.;  // of the dual, without slack
   Factors6 factors;
   int iterations = 0, iterations_in_vain = 0;
@@ -336,11 +335,11 @@ struct DistributionSolver::Workspace {
                const Matrix6* outside = nullptr);
   bool hasFullRank() const {
     const Vector6& pivots = factors.pivots();
-    return (pivots.array() > kFullRank * pivots.maxCoeff()).all();
+    return (pivots.array() > Tolerances::full_rank * pivots.maxCoeff()).all();
   }
   double findMeanCompliance() const;
   bool startFree();
-  double enough() const { return std::max(may_lack, kRounding * terms); }
+  double enough() const { return std::max(may_lack, Tolerances::rounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
   bool isReachedWithoutSlack();
@@ -433,7 +432,7 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
     const Vector6 gradient = slack * (multipliers - centre) - missing();
     const double size = gradient.norm();
     // What no step makes smaller, and is small, is rounding.
-    if (size <= enough() || (size <= kMissing && size > 0.5 * former)) return true;
+    if (size <= enough() || (size <= Tolerances::missing && size > 0.5 * former)) return true;
     former = size;
     if (step == steps || iterations >= maximal_iterations) return false;
     ++iterations;
@@ -446,10 +445,10 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
     const auto costOf = [&] { return value + 0.5 * slack * (multipliers - centre).squaredNorm(); };
     const double cost = costOf();
     // Where the dual has no digits for what the step promises, the gradient has.
-    const bool is_local = -slope <= kRounding * std::abs(cost);
+    const bool is_local = -slope <= Tolerances::rounding * std::abs(cost);
     double length = 1., lower = 0., upper = 1., lower_slope = slope, upper_slope = 0.;
     for (int cut = 0;; ++cut) {
-      if (cut == kMaximalCuts) return false;
+      if (cut == Tolerances::cuts) return false;
       evaluate(start + length * direction, which);
       const Vector6 residual = slack * (multipliers - centre) - missing();
       if (residual.norm() <= enough()) return true;
@@ -460,17 +459,17 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
       }
       const double end_slope = residual.dot(direction);
       const bool descends = end_slope <= 0.;
-      if ((descends && cut == 0) || (descends && -end_slope <= -kFlat * slope) ||
-          (!descends && end_slope <= -kFlat * slope &&
-           costOf() <= cost + kArmijo * length * slope + kRounding * std::abs(cost)))
+      if ((descends && cut == 0) || (descends && -end_slope <= -Tolerances::flat * slope) ||
+          (!descends && end_slope <= -Tolerances::flat * slope &&
+           costOf() <=
+               cost + Tolerances::armijo * length * slope + Tolerances::rounding * std::abs(cost)))
         break;
       (descends ? lower : upper) = length;
       (descends ? lower_slope : upper_slope) = end_slope;
       if (cut % 2 == 0)
         length = lower + (upper - lower) * lower_slope / (lower_slope - upper_slope);
       else
-        length = upper > kFarApart * lower && lower > 0. ? std::sqrt(lower * upper)
-                                                         : 0.5 * (lower + upper);
+        length = 0.5 * (lower + upper);
     }
   }
 }
@@ -493,34 +492,35 @@ bool DistributionSolver::Workspace::startFree() {
 DistributionStatus DistributionSolver::Workspace::search() {
   residual.setZero();
   const Which all = &Block::set;
-  double slack = kFirstSlack * findMeanCompliance();
+  double slack = Tolerances::first_slack * findMeanCompliance();
   if (warm_start && has_answer) {
     const bool was_reached = solution.status == DistributionStatus::Solved;
     const Vector6 last = multipliers;
     evaluate(was_reached ? last : slackened, all);
     if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
     if (was_reached) {
-      if (descend(all, 0., last, kWarmSteps)) return DistributionStatus::Solved;
+      if (descend(all, 0., last, Tolerances::direct_steps)) return DistributionStatus::Solved;
     } else {
       if (relax(last)) return DistributionStatus::Relaxed;
-      descend(all, slack, Vector6::Zero(), kWarmSteps);
+      descend(all, slack, Vector6::Zero(), Tolerances::direct_steps);
       if (relax(last)) return DistributionStatus::Relaxed;
     }
     iterations_in_vain = std::exchange(iterations, 0);
   }
-  if (startFree() && descend(all, 0., multipliers, kFreeSteps)) return DistributionStatus::Solved;
+  if (startFree() && descend(all, 0., multipliers, Tolerances::direct_steps))
+    return DistributionStatus::Solved;
   if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
 
   is_accurate = false;
   // The proximal point method on the dual, which is the method of multipliers (Rockafellar 1976).
-  const double least_slack = kLeastSlack / kFirstSlack * slack;
+  const double least_slack = Tolerances::least_slack / Tolerances::first_slack * slack;
   double former = std::numeric_limits<double>::infinity();
   Vector6 centre = Vector6::Zero(), former_missing = Vector6::Zero();
-  for (int round = 0; round < kMaximalRounds && iterations < maximal_iterations; ++round) {
-    descend(all, slack, centre, kMaximalSteps);
+  for (int round = 0; round < Tolerances::rounds && iterations < maximal_iterations; ++round) {
+    descend(all, slack, centre, Tolerances::steps);
     const Vector6 lacking = missing();
     const double size = lacking.norm();
-    if (size <= kReach && isReachedWithoutSlack()) return DistributionStatus::Solved;
+    if (size <= Tolerances::reach && isReachedWithoutSlack()) return DistributionStatus::Solved;
     if (size <= enough()) return DistributionStatus::Solved;
     // What stays is out of reach, if it proves so.
     const bool stays = (lacking - former_missing).norm() <= 0.1 * size;
@@ -530,19 +530,20 @@ DistributionStatus DistributionSolver::Workspace::search() {
       if (slack <= least_slack && relax(multipliers, false)) return DistributionStatus::Relaxed;
     }
     former_missing = lacking;
-    if (size > kFall * former) slack = std::max(slack * kSlackFactor, least_slack);
+    if (size > Tolerances::fall * former)
+      slack = std::max(slack * Tolerances::slack_factor, least_slack);
     former = size;
     centre = multipliers;
   }
-  return missing().norm() <= kReach ? DistributionStatus::Solved
-                                    : DistributionStatus::NumericalFailure;
+  return missing().norm() <= Tolerances::reach ? DistributionStatus::Solved
+                                               : DistributionStatus::NumericalFailure;
 }
 
 // Next to the answer, Newton's method without slack has all digits. Returns whether it is there, or
 // leaves the multipliers where they are.
 bool DistributionSolver::Workspace::isReachedWithoutSlack() {
   const Vector6 kept = multipliers;
-  is_accurate = descend(&Block::set, 0., kept, kFreeSteps);
+  is_accurate = descend(&Block::set, 0., kept, Tolerances::direct_steps);
   if (!is_accurate) evaluate(kept, &Block::set);
   return is_accurate;
 }
@@ -559,7 +560,8 @@ bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, i
     for (int k = 0; k < span.count; ++k)
       directions.push_back(block.wrenchOf(span.axes.col(k)).normalized());
   }
-  return internal::findSpan(directions, kIndependent, is_certain ? kDependent : kIndependent, basis,
+  return internal::findSpan(directions, Tolerances::independent,
+                            is_certain ? Tolerances::dependent : Tolerances::independent, basis,
                             rank);
 }
 
@@ -571,7 +573,7 @@ bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, i
 // @param outside  the projector on what they do not span
 bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outside) {
   bool is_found = false, is_near = false;
-  for (int step = 0; step < kResidualSteps && !is_found; ++step) {
+  for (int step = 0; step < Tolerances::steps && !is_found; ++step) {
     Matrix6 bend = Matrix6::Zero();
     bool is_bent = false;
     for (Block& block : blocks) {
@@ -605,12 +607,13 @@ bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outsi
     }
     // One step more than it takes: where a disc is hardly pulled, its point has few digits else.
     is_found = is_near;
-    is_near = (residual - former).norm() <= kMissing;
+    is_near = (residual - former).norm() <= Tolerances::missing;
   }
   const double size = residual.norm();
-  if (!is_found || !(size > kReach) || !std::isfinite(size)) return false;
+  if (!is_found || !(size > Tolerances::reach) || !std::isfinite(size)) return false;
   for (Block& block : blocks)
-    if (!block.set.expose(block.pullOf(residual), (kExposed * size + kRounding) * block.reach(),
+    if (!block.set.expose(block.pullOf(residual),
+                          (Tolerances::exposed * size + Tolerances::rounding) * block.reach(),
                           block.face))
       return false;
   return true;
@@ -626,18 +629,18 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
   const Vector6 start = multipliers;
   const Matrix6 stiff = compliance * outside;
   evaluate(start, face);
-  bool given = descend(face, 0., start, kFreeSteps, &stiff);
+  bool given = descend(face, 0., start, Tolerances::direct_steps, &stiff);
   if (!given) {
     Vector6 centre = start;
     evaluate(start, face);
-    double slack = kFaceSlack * compliance, former = missing().norm();
-    for (int slow = 0; slow < kSlowRounds && iterations < maximal_iterations;) {
-      descend(face, slack, centre, kMaximalSteps);
+    double slack = Tolerances::first_slack * compliance, former = missing().norm();
+    for (int slow = 0; slow < Tolerances::slow_rounds && iterations < maximal_iterations;) {
+      descend(face, slack, centre, Tolerances::steps);
       const double size = missing().norm();
-      if (size <= enough() || (size <= kMissing && size > 0.5 * former)) break;
-      if (size > kFall * former) {
+      if (size <= enough() || (size <= Tolerances::missing && size > 0.5 * former)) break;
+      if (size > Tolerances::fall * former) {
         ++slow;
-        slack = std::max(slack * kSlackFactor, kLeastSlack * compliance);
+        slack = std::max(slack * Tolerances::slack_factor, Tolerances::least_slack * compliance);
       }
       former = size;
       centre = multipliers;
@@ -646,7 +649,7 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
     evaluate(multipliers - outside * multipliers, face);
     given = missing().norm() <= std::max(may_be_left, enough());
   }
-  may_lack = kMissing;
+  may_lack = Tolerances::missing;
   return given;
 }
 
@@ -658,7 +661,7 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
 // @param is_certain  whether a direction that faces hardly span is not to be left out
 bool DistributionSolver::Workspace::relax(const Vector6& start, bool is_certain) {
   residual = missing();
-  if (residual.norm() > kReach) {
+  if (residual.norm() > Tolerances::reach) {
     const Vector6 kept = multipliers;
     Matrix6 outside;
     if (findResidual(is_certain, outside) && reachClosest(is_certain, start, outside)) {
@@ -677,7 +680,7 @@ bool DistributionSolver::Workspace::reachClosest(bool is_certain, const Vector6&
   const Vector6 asked = target;
   target -= residual;
   multipliers = start - outside * start;
-  const bool given = reachOnFaces(outside, is_certain ? kMissing : kHardlySpanned);
+  const bool given = reachOnFaces(outside, is_certain ? Tolerances::missing : Tolerances::exposed);
   target = asked;
   if (!given) return false;
   if (!is_certain) residual = missing();
@@ -686,12 +689,12 @@ bool DistributionSolver::Workspace::reachClosest(bool is_certain, const Vector6&
   double gap = 0.;
   for (const Block& block : blocks) {
     const Vector6 pull = block.pullOf(residual);
-    gap += std::max(0., block.set.support(pull, kExposed * size * block.reach()) -
+    gap += std::max(0., block.set.support(pull, Tolerances::exposed * size * block.reach()) -
                             pull.dot(block.response.force));
   }
-  is_accurate =
-      is_certain && size >= kFar * weights.maxCoeff() / weights.minCoeff() && exposesClearly();
-  return gap <= kReach * size;
+  is_accurate = is_certain && size >= Tolerances::far * weights.maxCoeff() / weights.minCoeff() &&
+                exposesClearly();
+  return gap <= Tolerances::reach * size;
 }
 
 // Whether the residual exposes the same faces, whatever of it is taken for rounding.
@@ -703,7 +706,7 @@ bool DistributionSolver::Workspace::exposesClearly() {
     return face.span().count;
   };
   return std::all_of(blocks.begin(), blocks.end(), [&](const Block& block) {
-    return countAxes(block, kSurelyNone) == countAxes(block, kSurelyExposed);
+    return countAxes(block, Tolerances::missing) == countAxes(block, Tolerances::reach);
   });
 }
 
@@ -754,9 +757,10 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   if (!problem.wrench.allFinite()) {
     solution.status = DistributionStatus::InvalidInput;
   } else if (contacts == 0) {
-    solution.status = wrench_size == 0. || D.cwiseProduct(problem.wrench).norm() <= kReach * scale
-                          ? DistributionStatus::Solved
-                          : DistributionStatus::NoContact;
+    solution.status =
+        wrench_size == 0. || D.cwiseProduct(problem.wrench).norm() <= Tolerances::reach * scale
+            ? DistributionStatus::Solved
+            : DistributionStatus::NoContact;
   } else if (scale == 0.) {
     solution.status = DistributionStatus::Solved;  // by no forces at all
   } else {
