@@ -360,19 +360,21 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
   blocks.resize(problem.contacts.size());
   directions.reserve(6 * blocks.size());
   largest_weight = 0.;
-  for (const auto& contact : problem.contacts)
-    largest_weight =
-        std::max(largest_weight, contact.weights.size() > 0 ? contact.weights.maxCoeff() : 1.);
+  for (const auto& contact : problem.contacts) {
+    if (contact.weights.size() == 0) largest_weight = std::max(largest_weight, 1.);
+    for (Index i = 0; i < contact.weights.size(); ++i)
+      largest_weight = std::max(largest_weight, contact.weights[i]);
+  }
   for (std::size_t k = 0; k < blocks.size(); ++k) {
     const DistributionProblem::Contact& contact = problem.contacts[k];
     Block& block = blocks[k];
     const Index n = contact.set.size();
     block.size = int(n);
     Vector6 own = Vector6::Ones();
-    if (contact.weights.size() > 0)
-      own.head(n) = contact.weights / largest_weight;
-    else
-      own.head(n) /= largest_weight;
+    withSize(int(n), [&](auto size) {
+      if (contact.weights.size() > 0) own.head<size>() = contact.weights.template head<size>();
+      own.head<size>() /= largest_weight;
+    });
     if (!block.is_described || block.weights != own || block.described != contact.set) {
       block.weights = own;
       block.inverse_weights = own.cwiseInverse();
@@ -384,8 +386,8 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
     block.set.setUnit(contact.set, own, unit);
     block.has_reference = contact.reference.size() > 0;
     block.reference.setZero();
-    if (block.has_reference)
-      block.reference.head(n) = contact.reference.cwiseProduct(own.head(n)) / unit;
+    for (Index i = 0; i < contact.reference.size(); ++i)
+      block.reference[i] = contact.reference[i] * own[i] / unit;
   }
 }
 
@@ -492,7 +494,6 @@ bool DistributionSolver::Workspace::startFree() {
 DistributionStatus DistributionSolver::Workspace::search() {
   residual.setZero();
   const Which all = &Block::set;
-  double slack = Tolerances::first_slack * findMeanCompliance();
   if (warm_start && has_answer) {
     const bool was_reached = solution.status == DistributionStatus::Solved;
     const Vector6 last = multipliers;
@@ -502,6 +503,7 @@ DistributionStatus DistributionSolver::Workspace::search() {
       if (descend(all, 0., last, Tolerances::direct_steps)) return DistributionStatus::Solved;
     } else {
       if (relax(last)) return DistributionStatus::Relaxed;
+      const double slack = Tolerances::first_slack * findMeanCompliance();
       descend(all, slack, Vector6::Zero(), Tolerances::direct_steps);
       if (relax(last)) return DistributionStatus::Relaxed;
     }
@@ -513,7 +515,9 @@ DistributionStatus DistributionSolver::Workspace::search() {
 
   is_accurate = false;
   // The proximal point method on the dual, which is the method of multipliers (Rockafellar 1976).
-  const double least_slack = Tolerances::least_slack / Tolerances::first_slack * slack;
+  const double compliance = findMeanCompliance();
+  const double least_slack = Tolerances::least_slack * compliance;
+  double slack = Tolerances::first_slack * compliance;
   double former = std::numeric_limits<double>::infinity();
   Vector6 centre = Vector6::Zero(), former_missing = Vector6::Zero();
   for (int round = 0; round < Tolerances::rounds && iterations < maximal_iterations; ++round) {
@@ -789,8 +793,9 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
     if (!answered) continue;
     const Block& block = work.blocks[k];
     const Vector6& x = block.response.force;
-    solution.bounds[k] = block.set.findBounds(block.response, block.decidingPull(work.residual));
-    force = unit * x.cwiseProduct(block.inverse_weights).head(force.size());
+    if (!block.response.is_free)
+      solution.bounds[k] = block.set.findBounds(block.response, block.decidingPull(work.residual));
+    for (Index i = 0; i < force.size(); ++i) force[i] = unit * x[i] * block.inverse_weights[i];
     solution.cost += 0.5 * (x - block.reference).squaredNorm() * std::pow(unit * largest, 2);
     solution.achieved += unit * block.wrenchOf(x).cwiseQuotient(work.weights);
   }

@@ -361,8 +361,9 @@ ScaledSet::ScaledSet(const ContactSet& set, const Vector6& weights)
 }
 
 void ScaledSet::setUnit(const ContactSet& set, const Vector6& weights, double unit) {
-  lower_.head(size_) = set.lower().cwiseProduct(weights).head(size_) / unit;
-  upper_.head(size_) = set.upper().cwiseProduct(weights).head(size_) / unit;
+  const Vector6 scale = weights / unit;
+  lower_ = set.lower().cwiseProduct(scale);
+  upper_ = set.upper().cwiseProduct(scale);
 }
 
 bool ScaledSet::isInside(const Vector6& point) const {
