@@ -48,6 +48,10 @@ constexpr double kPinned = 1e-4;
 // accelerations elsewhere: what was before and comes after knows of no change. Joints may have to,
 // where feet that slid stand still.
 constexpr double kRest = 1e3;
+// By how much more it costs to move points from their places near these ends. Much more, and where
+// places cannot be kept, joints go far for little.
+constexpr double kRestOfPlaces = 100.;
+
 // By how much more an end that is pinned costs than other frames.
 constexpr double kAnchor = 1e10;
 
@@ -375,7 +379,7 @@ double WholeBodyWindow::weighChange(Index frame) const {
 // depends on them, the root is at rest, and feet would have to move instead.
 double WholeBodyWindow::weighPlaces(Index frame) const {
   const bool is_near_end = std::min(frame, problem_.time.size() - 1 - frame) <= kFarthest;
-  return differ(frame).duration * hold_ * (is_near_end ? kRest : 1.);
+  return differ(frame).duration * hold_ * (is_near_end ? kRestOfPlaces : 1.);
 }
 
 // Of squares of accelerations in a frame.

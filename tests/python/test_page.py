@@ -286,10 +286,16 @@ REPAIR = {
     "codes_written": ["feasible"],
     "missing_before": {"force_rms": 0.0321, "torque_rms": 0.0654, "frames": 263},
     "missing": {"force_rms": 0.00123, "torque_rms": 0.00456, "frames": 7},
-    "root": {"rms": 0.0015, "largest": 0.00612, "time": 1.25},
-    "joints": {"rms": 0.001, "largest": np.pi / 90.0, "time": 1.5, "joint": "left_knee"},
-    "com": {"rms": 0.0011, "largest": 0.00527, "time": 1.75},
-    "turn": {"rms": np.pi / 360.0, "largest": np.pi / 120.0, "time": 2.0},
+    "root": {"rms": 0.0015, "largest": 0.00612, "frame": 30, "time": 1.25},
+    "joints": {
+        "rms": 0.001,
+        "largest": np.pi / 90.0,
+        "frame": 36,
+        "time": 1.5,
+        "joint": "left_knee",
+    },
+    "com": {"rms": 0.0011, "largest": 0.00527, "frame": 42, "time": 1.75},
+    "turn": {"rms": np.pi / 360.0, "largest": np.pi / 120.0, "frame": 48, "time": 2.0},
     "ground_offset": 0.0,
     "ground_tilt": 0.0,
     "stretch": 1.0,
@@ -298,6 +304,8 @@ REPAIR = {
     "stances": {
         **{"count": 12, "held": 10, "largest_speed_before": 0.081, "largest_speed": 0.0123},
         **{"largest_drift_before": 0.0172, "largest_drift": 0.00034},
+        **{"largest_sunk_before": 0.0041, "largest_sunk": 0.00021},
+        **{"largest_floating_before": 0.0093, "largest_floating": 0.00057},
     },
     "reasons": [],
 }
@@ -350,20 +358,22 @@ def test_the_section_on_repair(talos, repaired, tmp_path, monkeypatch):
         ("Frames out of reach", "263", "7"),
         ("Contacts slide by up to", "81 mm/s", "12.3 mm/s"),
         ("Contacts drift by up to", "17.2 mm", "0.34 mm"),
+        ("Contacts are below the ground by up to", "4.1 mm", "0.21 mm"),
+        ("Contacts that carry are above it by up to", "9.3 mm", "0.57 mm"),
     ):
         assert row(text, title) == cells
     for title, rms, largest, time in (
-        ("Root displaced", "1.5 mm", "6.12 mm", 1.25),
-        ("Centre of mass displaced", "1.1 mm", "5.27 mm", 1.75),
-        ("Root turned", "0.5°", "1.5°", 2.0),
-        ("Joints turned", "0.0573°", "2°|left_knee|", 1.5),
+        ("Root displaced", "1.5 mm", "6.12 mm|frame 30|", 1.25),
+        ("Centre of mass displaced", "1.1 mm", "5.27 mm|frame 42|", 1.75),
+        ("Root turned", "0.5°", "1.5°|frame 48|", 2.0),
+        ("Joints turned", "0.0573°", "2°|left_knee, frame 36|", 1.5),
     ):
         *sizes, button = row(text, title)
         assert sizes == [rms, largest]
         assert f'data-time="{time}"' in button
     assert "10 of 12 stances are held still." in text
     assert "<summary>1 step</summary><ol><li>balance What moves stays.</li></ol>" in text
-    for nothing in ("limits", "the ground", "stretched", "besides"):
+    for nothing in ("limits", "to the ground", "stretched", "besides"):
         assert nothing not in text
 
 

@@ -109,6 +109,7 @@ def objects(talos, talos_standing, talos_motion):
         mended,
         mended.repair,
         mended.repair.root,
+        mended.repair.feet,
         mended.repair.steps[0],
         repairer.repair(few).reasons[0],
         dynacom.RepairGround(),
