@@ -23,10 +23,15 @@ struct Swayer {
                                     SE3(Matrix3d::Identity(), Vector3d(0., 0., 0.3)), "arm");
     model.appendBodyToJoint(arm, pinocchio::Inertia::FromSphere(2., 0.1),
                             SE3(Matrix3d::Identity(), Vector3d(0.3, 0., 0.)));
+    setUpRobot(mu);
+    split.emplace(dynacom::splitContacts(*robot, {}, friction));
+  }
+
+  /// The robot of the model, with soles on both feet; again, once that was changed.
+  void setUpRobot(double mu = 0.7) {
     robot.emplace(model);
     for (const char* name : {"left", "right"})
       robot->addContact(makeSole(std::string(name) + "_foot", mu), name);
-    split.emplace(dynacom::splitContacts(*robot, {}, friction));
   }
 
   /// Stands with its feet side by side.

@@ -73,12 +73,10 @@ BOOST_AUTO_TEST_CASE(turns_and_limits_are_told) {
   Swayer walker;
   walker.model.upperPositionLimit[13] = 1.6;
   walker.model.lowerPositionLimit[13] = 0.;
-  DynaCoM robot(walker.model);
-  for (const char* name : {"left", "right"})
-    robot.addContact(makeSole(std::string(name) + "_foot"), name);
+  walker.setUpRobot();
   const RecordedMotion recorded = record(walker.sway(300, 0.09));
   RepairerSettings settings;
-  const MotionRepair limited = repairRecordedMotion(robot, recorded, settings);
+  const MotionRepair limited = repairRecordedMotion(*walker.robot, recorded, settings);
   BOOST_TEST(limited.turn.largest > 1e-4);
   BOOST_TEST(std::abs(limited.joint_excess_before - 0.2) < 0.02);
   // Who is beyond is never called repaired.
@@ -87,7 +85,7 @@ BOOST_AUTO_TEST_CASE(turns_and_limits_are_told) {
   BOOST_TEST((limited.outcome == RepairOutcome::Repaired) == !is_beyond);
   // Nobody asked for limits, and yet who is beyond is not repaired, even if not more than before.
   settings.repair.joints = settings.repair.feet = false;
-  const MotionRepair other = repairRecordedMotion(robot, recorded, settings);
+  const MotionRepair other = repairRecordedMotion(*walker.robot, recorded, settings);
   BOOST_TEST(other.missing == 0);
   BOOST_TEST(other.joint_excess > 0.1);
   BOOST_TEST(hasReason(other, "joint_limits"));
@@ -102,12 +100,11 @@ BOOST_AUTO_TEST_CASE(what_slides_is_beyond_its_limits_in_metres) {
   walker.model.appendBodyToJoint(slider, pinocchio::Inertia::FromSphere(0.1, 0.1), SE3::Identity());
   walker.model.lowerPositionLimit[14] = -0.3;
   walker.model.upperPositionLimit[14] = -0.05;
-  DynaCoM robot(walker.model);
-  for (const char* name : {"left", "right"})
-    robot.addContact(makeSole(std::string(name) + "_foot"), name);
+  walker.setUpRobot();
   RepairerSettings settings;
   settings.repair.joints = settings.repair.feet = false;
-  const MotionRepair repair = repairRecordedMotion(robot, record(walker.sway(300, 0.09)), settings);
+  const MotionRepair repair =
+      repairRecordedMotion(*walker.robot, record(walker.sway(300, 0.09)), settings);
   BOOST_TEST(close(repair.joint_excess, 0.05, 5e-3));
   for (const RepairReason& reason : repair.reasons)
     if (reason.code == "joint_limits") BOOST_TEST(reason.text.find(" m") != std::string::npos);
@@ -160,13 +157,12 @@ BOOST_AUTO_TEST_CASE(joints_are_limited_where_feet_are_not_held) {
   Swayer walker;
   walker.model.upperPositionLimit[13] = 1.6;
   walker.model.lowerPositionLimit[13] = 0.;
-  DynaCoM robot(walker.model);
-  for (const char* name : {"left", "right"})
-    robot.addContact(makeSole(std::string(name) + "_foot"), name);
+  walker.setUpRobot();
   RepairerSettings settings;
   settings.repair.largest_drift = 0.1;
   settings.largest_displacement = 0.06;  // less than feet drift
-  const MotionRepair repair = repairRecordedMotion(robot, record(skate(walker, 0.08)), settings);
+  const MotionRepair repair =
+      repairRecordedMotion(*walker.robot, record(skate(walker, 0.08)), settings);
   BOOST_TEST(isKept(repair, RepairRung::Balance));
   BOOST_TEST(!isKept(repair, RepairRung::Feet));
   BOOST_TEST(isKept(repair, RepairRung::Joints));
