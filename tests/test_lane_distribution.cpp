@@ -230,7 +230,8 @@ SetProblem describe(const Problem& problem) {
 }
 
 /// Whether a force is on the boundary of its set, but for a part of a unit.
-bool isOnBoundary(const ProblemContact& contact, const VectorXd& force, double unit) {
+bool isOnBoundary(const ProblemContact& contact, const DistributionProblem::Components& force,
+                  double unit) {
   const double normal = force[2], along = contact.is_cone
                                               ? force.head<2>().norm()
                                               : force.head<2>().lpNorm<Eigen::Infinity>();
@@ -266,7 +267,7 @@ void checkCones(const Stand& stand, Tally& tally) {
         for (std::size_t k = 0; k < analysis.contacts.size(); ++k) {
           if (!analysis.contacts[k].active[frame]) continue;
           const ProblemContact& contact = problem.contacts[next];
-          VectorXd& force = actual.forces[next++];
+          DistributionProblem::Components& force = actual.forces[next++];
           const auto own = [&](const MotionAnalysis& found) {
             return found.contacts[k].wrench.col(frame).head(force.size());
           };
