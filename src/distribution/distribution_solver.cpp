@@ -653,6 +653,7 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
     evaluate(multipliers - outside * multipliers, face);
     given = missing().norm() <= std::max(may_be_left, enough());
   }
+  is_accurate = missing().norm() <= enough();
   may_lack = Tolerances::missing;
   return given;
 }
@@ -696,7 +697,8 @@ bool DistributionSolver::Workspace::reachClosest(bool is_certain, const Vector6&
     gap += std::max(0., block.set.support(pull, Tolerances::exposed * size * block.reach()) -
                             pull.dot(block.response.force));
   }
-  is_accurate = is_certain && size >= Tolerances::far * weights.maxCoeff() / weights.minCoeff() &&
+  is_accurate = is_accurate && is_certain &&
+                size >= Tolerances::far * weights.maxCoeff() / weights.minCoeff() &&
                 exposesClearly();
   return gap <= Tolerances::reach * size;
 }
@@ -775,7 +777,6 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   // An answer that the last one's multipliers lead to takes none; it counts as one all the same.
   solution.iterations = work.iterations + work.iterations_in_vain;
   if (contacts > 0 && scale > 0.) solution.iterations = std::max(1, solution.iterations);
-  solution.is_accurate = work.is_accurate;
   const bool answered = contacts > 0 && scale > 0. &&
                         (solution.status == DistributionStatus::Solved ||
                          solution.status == DistributionStatus::Relaxed);
@@ -784,6 +785,7 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   solution.multipliers.setZero();
   solution.cost = 0.;
   const double largest = work.largest_weight;
+  double sizes = 0.;  // of what the cost is a difference of
   if (answered)
     solution.multipliers = unit * largest * largest * work.weights.cwiseProduct(work.multipliers);
   for (std::size_t k = 0; k < contacts; ++k) {
@@ -797,8 +799,13 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
       solution.bounds[k] = block.set.findBounds(block.response, block.decidingPull(work.residual));
     for (Index i = 0; i < force.size(); ++i) force[i] = unit * x[i] * block.inverse_weights[i];
     solution.cost += 0.5 * (x - block.reference).squaredNorm() * std::pow(unit * largest, 2);
+    sizes += 0.5 * (x.squaredNorm() + block.reference.squaredNorm());
     solution.achieved += unit * block.wrenchOf(x).cwiseQuotient(work.weights);
   }
+  // What of the wrench is rounding has a price, by the multipliers.
+  solution.is_accurate =
+      work.is_accurate &&
+      work.multipliers.norm() * Tolerances::rounding * work.terms <= Tolerances::reach * sizes;
   // That of the closest wrench is known with more digits than the difference has.
   solution.residual = solution.status == DistributionStatus::Relaxed
                           ? Vector6(unit * work.residual.cwiseQuotient(work.weights))
