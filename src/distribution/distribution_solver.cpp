@@ -315,7 +315,10 @@ struct DistributionSolver::Workspace {
   double largest_weight = 0.;  // of the cost, of all contacts
   // What the last answer leaves to start from.
   bool has_answer = false;
-  Vector6 slackened = Vector6::Zero();  // multipliers from which the last Relaxed answer was found
+  // The multipliers from which the last Relaxed answer was found, and with which slack and centre
+  // these were.
+  Vector6 slackened = Vector6::Zero(), last_centre = Vector6::Zero();
+  double last_slack = 0.;
 
   // Of the multipliers at hand.
   Vector6 multipliers = Vector6::Zero(), achieved = Vector6::Zero();
@@ -342,6 +345,7 @@ struct DistributionSolver::Workspace {
   double enough() const { return std::max(may_lack, Tolerances::rounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
+  DistributionStatus approach(double slack, Vector6 centre, int rounds);
   bool isReachedWithoutSlack();
   bool relax(const Vector6& start, bool is_certain = true);
   bool spanFaces(bool is_certain, Matrix6& basis, int& rank, Vector6& fixed);
@@ -493,41 +497,50 @@ bool DistributionSolver::Workspace::startFree() {
 
 DistributionStatus DistributionSolver::Workspace::search() {
   residual.setZero();
-  const Which all = &Block::set;
   if (warm_start && has_answer) {
     const bool was_reached = solution.status == DistributionStatus::Solved;
     const Vector6 last = multipliers;
-    evaluate(was_reached ? last : slackened, all);
+    evaluate(was_reached ? last : slackened, &Block::set);
     if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
     if (was_reached) {
-      if (descend(all, 0., last, Tolerances::direct_steps)) return DistributionStatus::Solved;
+      if (descend(&Block::set, 0., last, Tolerances::direct_steps))
+        return DistributionStatus::Solved;
     } else {
       if (relax(last)) return DistributionStatus::Relaxed;
-      const double slack = Tolerances::first_slack * findMeanCompliance();
-      descend(all, slack, Vector6::Zero(), Tolerances::direct_steps);
-      if (relax(last)) return DistributionStatus::Relaxed;
+      const DistributionStatus status = approach(last_slack, last_centre, 1);
+      if (status != DistributionStatus::NumericalFailure) return status;
     }
     iterations_in_vain = std::exchange(iterations, 0);
+    is_accurate = true;
   }
-  if (startFree() && descend(all, 0., multipliers, Tolerances::direct_steps))
+  if (startFree() && descend(&Block::set, 0., multipliers, Tolerances::direct_steps))
     return DistributionStatus::Solved;
   if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
+  const DistributionStatus status =
+      approach(Tolerances::first_slack * findMeanCompliance(), Vector6::Zero(), Tolerances::rounds);
+  return status == DistributionStatus::NumericalFailure && missing().norm() <= Tolerances::reach
+             ? DistributionStatus::Solved
+             : status;
+}
 
+// The proximal point method on the dual, which is the method of multipliers (Rockafellar 1976),
+// from the multipliers at hand.
+DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6 centre,
+                                                           int rounds) {
   is_accurate = false;
-  // The proximal point method on the dual, which is the method of multipliers (Rockafellar 1976).
-  const double compliance = findMeanCompliance();
-  const double least_slack = Tolerances::least_slack * compliance;
-  double slack = Tolerances::first_slack * compliance;
-  double former = std::numeric_limits<double>::infinity();
-  Vector6 centre = Vector6::Zero(), former_missing = Vector6::Zero();
-  for (int round = 0; round < Tolerances::rounds && iterations < maximal_iterations; ++round) {
-    descend(all, slack, centre, Tolerances::steps);
+  const double least_slack = Tolerances::least_slack * findMeanCompliance();
+  double former = 0.;
+  Vector6 former_missing = Vector6::Zero();
+  for (int round = 0; round < rounds && iterations < maximal_iterations; ++round) {
+    descend(&Block::set, slack, centre, Tolerances::steps);
     const Vector6 lacking = missing();
     const double size = lacking.norm();
     if (size <= Tolerances::reach && isReachedWithoutSlack()) return DistributionStatus::Solved;
     if (size <= enough()) return DistributionStatus::Solved;
     // What stays is out of reach, if it proves so.
     const bool stays = (lacking - former_missing).norm() <= 0.1 * size;
+    last_slack = slack;
+    last_centre = centre;
     if (round == 0 || stays) {
       if (relax(multipliers)) return DistributionStatus::Relaxed;
       // No smaller slack will tell more.
@@ -539,8 +552,7 @@ DistributionStatus DistributionSolver::Workspace::search() {
     former = size;
     centre = multipliers;
   }
-  return missing().norm() <= Tolerances::reach ? DistributionStatus::Solved
-                                               : DistributionStatus::NumericalFailure;
+  return DistributionStatus::NumericalFailure;
 }
 
 // Next to the answer, Newton's method without slack has all digits. Returns whether it is there, or
