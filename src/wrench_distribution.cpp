@@ -512,6 +512,9 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
 // places have changed.
 void WrenchDistribution::Workspace::takeProblem() {
   bool same = added == solved;
+  // Multipliers of the wrench do not know the order of contacts.
+  bool are_others = !same && !std::is_permutation(added.begin(), added.end(), solved.begin(),
+                                                  solved.end());
   if (!same) rearrange();
   for (std::size_t k = 0; k < solved.size(); ++k) {
     Slot& slot = slots[solved[k]];
@@ -523,12 +526,14 @@ void WrenchDistribution::Workspace::takeProblem() {
       contact.A.bottomRows(slot.friction.rows()) = slot.friction;
       contact.weights = slot.weights;
       contact.reference = slot.reference;
+      are_others = true;
       slot.changed = same = false;
     }
     if (slot.moved) contact.NE.swap(slot.NE);
     slot.moved = false;
   }
   if (!same) takeSets();
+  if (are_others) sets.forget();
   if (knows_all_sets)
     for (std::size_t k = 0; k < solved.size(); ++k) place(result.contacts[k], problem.contacts[k]);
 }
@@ -545,7 +550,6 @@ void WrenchDistribution::Workspace::takeSets() {
     throwInvalid(
         "contacts that are given by matrices alone cannot share a wrench with ones that are more "
         "than pyramids");
-  sets.forget();
   problem.contacts.resize(knows_all_sets ? solved.size() : 0);
   for (std::size_t k = 0; k < solved.size(); ++k) {
     const Slot& slot = slots[solved[k]];

@@ -35,7 +35,7 @@ struct Tolerances {
   // manual's, and what a controller can tell.
   static constexpr double reach = 1e-8;
   // What an answer may lack: what forces of doubles lose by levers and weights of a few decades.
-  static constexpr double missing = 1e-12;
+  static constexpr double missing = 5e-13;
   // By how many units in the last place of its terms a sum of some ten may be off.
   static constexpr double rounding = 8. * std::numeric_limits<double>::epsilon();
 
@@ -330,6 +330,9 @@ struct DistributionSolver::Workspace {
   bool is_accurate = false;
 
   using Which = ScaledSet Block::*;
+  // What is tried for an answer out of reach: two steps on the faces, or as many as it takes, or
+  // these, too, where faces hardly span a direction, which is left out then.
+  enum class Effort { Little, Usual, All };
 
   void take(const DistributionProblem& problem, double unit, double overall_weight);
   void evaluate(const Vector6& nu, Which which);
@@ -345,14 +348,14 @@ struct DistributionSolver::Workspace {
   double enough() const { return std::max(may_lack, Tolerances::rounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
-  DistributionStatus approach(double slack, Vector6 centre, int rounds);
+  DistributionStatus approach(double slack, Vector6 centre, Effort effort, int rounds);
   bool isReachedWithoutSlack();
-  bool relax(const Vector6& start, bool is_certain = true);
-  bool spanFaces(bool is_certain, Matrix6& basis, int& rank, Vector6& fixed);
-  bool findResidual(bool is_certain, Matrix6& outside);
-  bool reachClosest(bool is_certain, const Vector6& start, const Matrix6& outside);
+  bool relax(const Vector6& start, Effort effort);
+  bool spanFaces(Effort effort, Matrix6& basis, int& rank, Vector6& fixed);
+  bool findResidual(Effort effort, Matrix6& outside);
+  bool reachClosest(Effort effort, const Vector6& start, const Matrix6& outside);
   bool exposesClearly();
-  bool reachOnFaces(const Matrix6& outside, double may_be_left);
+  bool reachOnFaces(Effort effort, const Matrix6& outside);
   std::vector<Vector6> directions;
 };
 
@@ -506,9 +509,11 @@ DistributionStatus DistributionSolver::Workspace::search() {
       if (descend(&Block::set, 0., last, Tolerances::direct_steps))
         return DistributionStatus::Solved;
     } else {
-      if (relax(last)) return DistributionStatus::Relaxed;
-      const DistributionStatus status = approach(last_slack, last_centre, 1);
-      if (status != DistributionStatus::NumericalFailure) return status;
+      const DistributionStatus status = relax(last, Effort::Little)
+                                            ? DistributionStatus::Relaxed
+                                            : approach(last_slack, last_centre, Effort::Little, 1);
+      // Without all digits, an answer is not to depend on the last one.
+      if (status != DistributionStatus::NumericalFailure && is_accurate) return status;
     }
     iterations_in_vain = std::exchange(iterations, 0);
     is_accurate = true;
@@ -516,8 +521,8 @@ DistributionStatus DistributionSolver::Workspace::search() {
   if (startFree() && descend(&Block::set, 0., multipliers, Tolerances::direct_steps))
     return DistributionStatus::Solved;
   if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
-  const DistributionStatus status =
-      approach(Tolerances::first_slack * findMeanCompliance(), Vector6::Zero(), Tolerances::rounds);
+  const DistributionStatus status = approach(Tolerances::first_slack * findMeanCompliance(),
+                                             Vector6::Zero(), Effort::Usual, Tolerances::rounds);
   return status == DistributionStatus::NumericalFailure && missing().norm() <= Tolerances::reach
              ? DistributionStatus::Solved
              : status;
@@ -526,7 +531,7 @@ DistributionStatus DistributionSolver::Workspace::search() {
 // The proximal point method on the dual, which is the method of multipliers (Rockafellar 1976),
 // from the multipliers at hand.
 DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6 centre,
-                                                           int rounds) {
+                                                           Effort effort, int rounds) {
   is_accurate = false;
   const double least_slack = Tolerances::least_slack * findMeanCompliance();
   double former = 0.;
@@ -542,9 +547,10 @@ DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6
     last_slack = slack;
     last_centre = centre;
     if (round == 0 || stays) {
-      if (relax(multipliers)) return DistributionStatus::Relaxed;
+      if (relax(multipliers, effort)) return DistributionStatus::Relaxed;
       // No smaller slack will tell more.
-      if (slack <= least_slack && relax(multipliers, false)) return DistributionStatus::Relaxed;
+      if (slack <= least_slack && relax(multipliers, Effort::All))
+        return DistributionStatus::Relaxed;
     }
     former_missing = lacking;
     if (size > Tolerances::fall * former)
@@ -566,7 +572,7 @@ bool DistributionSolver::Workspace::isReachedWithoutSlack() {
 
 // An orthonormal basis of the wrenches that the faces span, and the wrench that all forces in them
 // share. Returns false if the rank is not certain, and is to be.
-bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, int& rank,
+bool DistributionSolver::Workspace::spanFaces(Effort effort, Matrix6& basis, int& rank,
                                               Vector6& fixed) {
   directions.clear();
   fixed.setZero();
@@ -577,8 +583,8 @@ bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, i
       directions.push_back(block.wrenchOf(span.axes.col(k)).normalized());
   }
   return internal::findSpan(directions, Tolerances::independent,
-                            is_certain ? Tolerances::dependent : Tolerances::independent, basis,
-                            rank);
+                            effort == Effort::All ? Tolerances::independent : Tolerances::dependent,
+                            basis, rank);
 }
 
 // What is missing of the closest wrench, from the forces at hand and a guess: the part of the
@@ -587,7 +593,7 @@ bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, i
 // those that it exposes.
 //
 // @param outside  the projector on what they do not span
-bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outside) {
+bool DistributionSolver::Workspace::findResidual(Effort effort, Matrix6& outside) {
   bool is_found = false, is_near = false;
   for (int step = 0; step < Tolerances::steps && !is_found; ++step) {
     Matrix6 bend = Matrix6::Zero();
@@ -602,7 +608,7 @@ bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outsi
     Matrix6 basis;
     int rank = 0;
     Vector6 fixed;
-    if (!spanFaces(is_certain, basis, rank, fixed) || rank == 6) return false;
+    if (!spanFaces(effort, basis, rank, fixed) || rank == 6) return false;
     outside.noalias() = Matrix6::Identity() - basis * basis.transpose();
     const Vector6 rest = target - fixed;
     if (!is_bent) {
@@ -636,8 +642,7 @@ bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outsi
 }
 
 // The cheapest forces on the faces that give the target, from the multipliers at hand.
-// @param may_be_left  of the target
-bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double may_be_left) {
+bool DistributionSolver::Workspace::reachOnFaces(Effort effort, const Matrix6& outside) {
   const Which face = &Block::face;
   // What is missing of the target is to be accurate: nothing but rounding may be off.
   may_lack = 0.;
@@ -646,7 +651,7 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
   const Matrix6 stiff = compliance * outside;
   evaluate(start, face);
   bool given = descend(face, 0., start, Tolerances::direct_steps, &stiff);
-  if (!given) {
+  if (!given && effort != Effort::Little) {
     Vector6 centre = start;
     evaluate(start, face);
     double slack = Tolerances::first_slack * compliance, former = missing().norm();
@@ -663,6 +668,7 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
     }
     // Multipliers of what faces do not give mean nothing.
     evaluate(multipliers - outside * multipliers, face);
+    const double may_be_left = effort == Effort::All ? Tolerances::exposed : Tolerances::missing;
     given = missing().norm() <= std::max(may_be_left, enough());
   }
   is_accurate = missing().norm() <= enough();
@@ -674,14 +680,13 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
 // residual exposes, and the proof of both.
 //
 // What the minimum with slack lacks is nearly the residual.
-// @param start       from which multipliers on the forces are sought
-// @param is_certain  whether a direction that faces hardly span is not to be left out
-bool DistributionSolver::Workspace::relax(const Vector6& start, bool is_certain) {
+// @param start  from which multipliers on the forces are sought
+bool DistributionSolver::Workspace::relax(const Vector6& start, Effort effort) {
   residual = missing();
   if (residual.norm() > Tolerances::reach) {
     const Vector6 kept = multipliers;
     Matrix6 outside;
-    if (findResidual(is_certain, outside) && reachClosest(is_certain, start, outside)) {
+    if (findResidual(effort, outside) && reachClosest(effort, start, outside)) {
       slackened = kept;
       return true;
     }
@@ -692,15 +697,15 @@ bool DistributionSolver::Workspace::relax(const Vector6& start, bool is_certain)
 }
 
 // The cheapest forces that leave the residual, and the proof of both.
-bool DistributionSolver::Workspace::reachClosest(bool is_certain, const Vector6& start,
+bool DistributionSolver::Workspace::reachClosest(Effort effort, const Vector6& start,
                                                  const Matrix6& outside) {
   const Vector6 asked = target;
   target -= residual;
   multipliers = start - outside * start;
-  const bool given = reachOnFaces(outside, is_certain ? Tolerances::missing : Tolerances::exposed);
+  const bool given = reachOnFaces(effort, outside);
   target = asked;
   if (!given) return false;
-  if (!is_certain) residual = missing();
+  if (effort == Effort::All) residual = missing();
   const double size = residual.norm();
   // No reachable wrench is closer: forces are as far in the direction of the residual as any.
   double gap = 0.;
@@ -709,7 +714,7 @@ bool DistributionSolver::Workspace::reachClosest(bool is_certain, const Vector6&
     gap += std::max(0., block.set.support(pull, Tolerances::exposed * size * block.reach()) -
                             pull.dot(block.response.force));
   }
-  is_accurate = is_accurate && is_certain &&
+  is_accurate = is_accurate && effort != Effort::All &&
                 size >= Tolerances::far * weights.maxCoeff() / weights.minCoeff() &&
                 exposesClearly();
   return gap <= Tolerances::reach * size;
