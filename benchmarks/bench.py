@@ -16,9 +16,8 @@ def print_rows(rows):
         is_time = "median_ns" in row
         measured = f"{row['median_ns']:.0f} ns" if is_time else f"{row['instructions']:.0f}"
         ratio = "" if row["ratio"] is None else f"{row['ratio']:.3f}"
-        goal = page.GOALS.get(row["name"]) if is_time else None
-        shown_goal = f"{goal:.2f}" if goal else ""
-        table.append((row["name"], measured, ratio, shown_goal, row["reference"] or ""))
+        goal = page.GOALS.get(row["name"], "") if is_time else ""
+        table.append((row["name"], measured, ratio, goal, row["reference"] or ""))
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     for name, *numbers, reference in table:
         cells = [f"{cell:>{width}}" for cell, width in zip(numbers, widths[1:], strict=False)]
