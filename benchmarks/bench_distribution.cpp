@@ -92,7 +92,8 @@ Wrench leaning(const DynaCoM& robot, double angle) {
   for (const std::string& name : robot.getActiveContacts()) {
     const ContactBase& contact = *robot.getContact(name);
     const pinocchio::SE3 pose = contact.getSurfacePose();
-    for (const Eigen::Vector2d corner : contact.getCorners().colwise())
+    const Eigen::Matrix2Xd corners = contact.getCorners();
+    for (const Eigen::Vector2d corner : corners.colwise())
       front = std::max(front, pose.act(Eigen::Vector3d(corner[0], corner[1], 0.)).x());
   }
   Wrench wrench = pushed(0., 0., 0., 0., 0., 0.)(robot, angle);
@@ -295,17 +296,17 @@ std::vector<Case> makeCases() {
   // Exact cones, and polygons.
   const auto relaxed = DistributionStatus::Relaxed;
   addOther(cases, {"soles_cones/inside", talos_cones, still, 0}, "soles/inside");
-  addOther(cases, {"soles_cones/limit", talos_cones, active4, -1}, "soles/active4");
+  addOther(cases, {"soles_cones/limit", talos_cones, active4, 3}, "soles/active4");
   addOther(cases, {"soles_cones/slipping", talos_cones, slipping, -1, relaxed}, "soles/slipping");
   addOther(cases, {"soles_cones/tipping", talos_cones, tipping, -1, relaxed}, "soles/tipping");
   addOther(cases, {"points_cones/inside", quadruped_cones, still, 0}, "points/inside");
-  addOther(cases, {"points_cones/limit", quadruped_cones, edge, -1}, "points/edge");
+  addOther(cases, {"points_cones/limit", quadruped_cones, edge}, "points/edge");
   addOther(cases, {"points_cones/slipping", quadruped_cones, points_slipping, -1, relaxed},
            "points/slipping");
   addOther(cases, {"points_cones/tipping", quadruped_cones, points_tipping, -1, relaxed},
            "points/tipping");
   addOther(cases, {"octagons/inside", octagons, still, 0}, "soles/inside");
-  addOther(cases, {"octagons/active", octagons, active4, -1}, "soles/active4");
+  addOther(cases, {"octagons/active", octagons, active4, 3}, "soles/active4");
 
   // Out of reach by centimetres.
   addUnequal(cases, {"soles/leaning", talos, leaning, -1, relaxed}, "soles/active4");

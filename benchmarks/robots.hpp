@@ -2,6 +2,7 @@
 #pragma once
 
 #include <dynacom/dyna_com.hpp>
+#include <dynacom/surface_options.hpp>
 
 #include "peers.hpp"
 
