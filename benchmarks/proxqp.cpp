@@ -20,7 +20,6 @@ class Proxqp final : public Peer {
                           greatest = Eigen::VectorXd::Constant(inequalities, none);
     solver_.emplace(program.H.rows(), program.CE.rows(), inequalities,
                     proxqp::HessianType::Diagonal);
-    solver_->settings.eps_abs = kAccuracy;
     solver_->init(program.H, cost, program.CE, Eigen::VectorXd(-program.ce0), program.CI, least,
                   greatest);
   }
@@ -34,9 +33,6 @@ class Proxqp final : public Peer {
   }
 
  private:
-  // Its own, 1e-5, is too rough for forces that are said to be the same.
-  static constexpr double kAccuracy = 1e-6;
-
   Eigen::VectorXd equations_;
   std::optional<proxqp::dense::QP<double>> solver_;
 };
