@@ -47,7 +47,7 @@ def draw_goals(goals, folder):
     axes.set_xlim(0, widest + 0.4)
     axes.set_xticks(np.arange(0, widest + 0.1, 0.5))
     axes.grid(False, axis="y")
-    axes.set_xlabel("ratio to the reference, or time, as a share of its goal (1: just met)")
+    axes.set_xlabel("share of its goal (1: just met)")
     save(figure, folder, "goals")
 
 
