@@ -109,7 +109,7 @@ Clip readDance(Carried carried) {
 struct Reference {
   // Of a frame, as the general solver takes it; no solver where no foot stands.
   struct Program {
-    std::shared_ptr<Eiquadprog> solver;
+    std::shared_ptr<Peer> solver;
     Eigen::VectorXd ce0;
   };
 
@@ -129,7 +129,7 @@ struct Reference {
       if (robot.getActiveContacts().empty()) continue;
       const DistributionStatus status = distribute(robot, groundWrench(robot));
       const QuadraticProgram program = makeProgram(robot);
-      programs.back() = {makeEiquadprog("plain"), program.ce0};
+      programs.back() = {makePeer("eiquadprog/plain"), program.ce0};
       programs.back().solver->prepare(program);
       const Eigen::VectorXd& forces = programs.back().solver->solve(program.ce0);
       if (status == DistributionStatus::Solved) requireSameForces(robot, forces);

@@ -18,14 +18,15 @@ int main(int argc, char** argv) {
   const int repetitions = std::stoi(argv[3]);
 
   std::vector<QuadraticProgram> programs;
-  const std::unique_ptr<Eiquadprog> plain = makeEiquadprog("plain"), fast = makeEiquadprog("fast");
+  const std::unique_ptr<Peer> plain = makePeer("eiquadprog/plain"),
+                              fast = makePeer("eiquadprog/fast");
   for (std::size_t i = 0; i < walk.size(); ++i) {
     walk.step(i);
     walk.computeDynamics(i);
     if (walk.distributeForce() != dynacom::DistributionStatus::Solved)
       throw std::logic_error("tick " + std::to_string(i) + " of the walk is out of reach");
     programs.push_back(makeProgram(walk.talos));
-    for (Eiquadprog* solver : {plain.get(), fast.get()}) {
+    for (Peer* solver : {plain.get(), fast.get()}) {
       solver->prepare(programs[i]);
       requireSameForces(walk.talos, solver->solve(programs[i].ce0));
     }
@@ -63,7 +64,7 @@ int main(int argc, char** argv) {
   };
   const auto nothing = [](std::size_t) {};
   const auto distribute = [&walk](std::size_t) { walk.distributeForce(); };
-  const auto reference = [&](Eiquadprog& solver) {
+  const auto reference = [&](Peer& solver) {
     pass([&](std::size_t i) { solver.prepare(programs[i]); },
          [&](std::size_t i) { solver.solve(programs[i].ce0); });
   };

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-2-Clause
-#include "eiquadprog.hpp"
-
 #include <eiquadprog/eiquadprog-fast.hpp>
 #include <eiquadprog/eiquadprog-rt.hpp>
 #include <eiquadprog/eiquadprog.hpp>
-#include <stdexcept>
+
+#include "peers.hpp"
 
 namespace dynacom::benchmarks {
 namespace {
@@ -12,7 +11,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-class Plain final : public Eiquadprog {
+class Plain final : public Peer {
  public:
   void prepare(const QuadraticProgram& program) override {
     H_ = program.H;
@@ -37,7 +36,7 @@ class Plain final : public Eiquadprog {
   Eigen::VectorXi active_;
 };
 
-class Fast final : public Eiquadprog {
+class Fast final : public Peer {
  public:
   void prepare(const QuadraticProgram& program) override {
     if (program.CI.rows() != program_.CI.rows() || program.CI.cols() != program_.CI.cols())
@@ -59,7 +58,7 @@ class Fast final : public Eiquadprog {
   eiquadprog::solvers::EiquadprogFast solver_;
 };
 
-class Rt final : public Eiquadprog {
+class Rt final : public Peer {
  public:
   void prepare(const QuadraticProgram& program) override {
     H_ = program.H;
@@ -92,11 +91,8 @@ class Rt final : public Eiquadprog {
 
 }  // namespace
 
-std::unique_ptr<Eiquadprog> makeEiquadprog(const std::string& variant) {
-  if (variant == "plain") return std::make_unique<Plain>();
-  if (variant == "fast") return std::make_unique<Fast>();
-  if (variant == "rt") return std::make_unique<Rt>();
-  throw std::invalid_argument("eiquadprog has no variant '" + variant + "'");
-}
+std::unique_ptr<Peer> makeEiquadprogPlain() { return std::make_unique<Plain>(); }
+std::unique_ptr<Peer> makeEiquadprogFast() { return std::make_unique<Fast>(); }
+std::unique_ptr<Peer> makeEiquadprogRt() { return std::make_unique<Rt>(); }
 
 }  // namespace dynacom::benchmarks

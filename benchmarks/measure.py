@@ -33,7 +33,7 @@ PERCENTILES = {"p99": 99, "p99.9": 99.9, "maximum": 100}
 WALKS = {"walk": None, "walk_1kHz": 1000}
 
 # What bench_boundary is asked: which caps on the iterations.
-CAPS = (20, 50, 200, 100000)
+CAPS = (20, 50, 150, 100000)
 
 # What bench_jitter measures of each tick, and the edges of its histograms [ns]: 20 bins a decade.
 JITTER_SORTS = ("wake-up latency", "computation", "distributeForce")

@@ -31,7 +31,7 @@ def save(figure, folder, name):
 
 
 def draw_goals(goals, folder):
-    """Each ratio as a share of its goal; goals are (what, ratio, goal)."""
+    """Each ratio or time as a share of its goal; goals are (what, value, goal)."""
     labels, ratios, limits = map(np.array, zip(*goals, strict=True))
     shares, places, widest = ratios / limits, np.arange(len(goals)), 2.0
     figure, axes = plt.subplots(figsize=(8, 0.26 * len(goals) + 0.9), layout="constrained")
@@ -47,7 +47,7 @@ def draw_goals(goals, folder):
     axes.set_xlim(0, widest + 0.4)
     axes.set_xticks(np.arange(0, widest + 0.1, 0.5))
     axes.grid(False, axis="y")
-    axes.set_xlabel("ratio to the reference, as a share of its goal (1: just met)")
+    axes.set_xlabel("share of its goal (1: just met)")
     save(figure, folder, "goals")
 
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <dynacom/contact6d.hpp>
 #include <dynacom/contact_point.hpp>
+#include <dynacom/contact_polygon.hpp>
+#include <functional>
 #include <stdexcept>
 
 namespace dynacom::benchmarks {
@@ -11,25 +13,54 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-std::shared_ptr<ContactBase> makeSole(const std::string& frame) {
-  Contact6DSettings sole;
+using MakeContact = std::function<std::shared_ptr<ContactBase>(const std::string& frame)>;
+
+MakeContact makeSole(FrictionModel friction = FrictionModel::OuterPyramid) {
+  return [friction](const std::string& frame) {
+    Contact6DSettings sole;
+    sole.friction = friction;
+    sole.mu = kFriction;
+    sole.gu = kYawFriction;
+    sole.half_length = kHalfLength;
+    sole.half_width = kHalfWidth;
+    sole.frame_name = frame;
+    return std::make_shared<Contact6D>(sole);
+  };
+}
+
+std::shared_ptr<ContactBase> makeOctagon(const std::string& frame) {
+  constexpr double kCut = 0.02, length = kHalfLength, width = kHalfWidth;
+  ContactPolygonSettings sole;
   sole.mu = kFriction;
   sole.gu = kYawFriction;
-  sole.half_length = kHalfLength;
-  sole.half_width = kHalfWidth;
+  sole.vertices.resize(2, 8);
+  sole.vertices << length, length - kCut, kCut - length, -length, -length, kCut - length,
+      length - kCut, length,  //
+      width - kCut, width, width, width - kCut, kCut - width, -width, -width, kCut - width;
   sole.frame_name = frame;
-  return std::make_shared<Contact6D>(sole);
+  return std::make_shared<ContactPolygon>(sole);
 }
 
-std::shared_ptr<ContactBase> makePoint(const std::string& frame) {
-  ContactPointSettings point;
-  point.mu = kFriction;
-  point.frame_name = frame;
-  return std::make_shared<ContactPoint>(point);
+MakeContact makePoint(FrictionModel friction = FrictionModel::OuterPyramid) {
+  return [friction](const std::string& frame) {
+    ContactPointSettings point;
+    point.mu = kFriction;
+    point.friction = friction;
+    point.frame_name = frame;
+    return std::make_shared<ContactPoint>(point);
+  };
 }
 
-DynaCoM makeTrunk(const std::vector<Eigen::Vector3d>& feet,
-                  std::shared_ptr<ContactBase> (*makeContact)(const std::string&)) {
+DynaCoM makeTalosOn(const MakeContact& makeContact) {
+  DynaCoMSettings settings;
+  settings.urdf = DYNACOM_TALOS_URDF;
+  DynaCoM talos(settings);
+  for (const char* side : {"left", "right"})
+    talos.addContact(makeContact(std::string("leg_") + side + "_sole_fix_joint"), side);
+  return talos;
+}
+
+DynaCoM makeTrunk(const std::vector<Eigen::Vector3d>& feet, const MakeContact& makeContact) {
   pinocchio::Model model;
   const auto trunk =
       model.addJoint(0, pinocchio::JointModelFreeFlyer(), pinocchio::SE3::Identity(), "trunk");
@@ -59,14 +90,9 @@ std::vector<Eigen::Vector3d> around(int number) {
 
 }  // namespace
 
-DynaCoM makeTalos() {
-  DynaCoMSettings settings;
-  settings.urdf = DYNACOM_TALOS_URDF;
-  DynaCoM talos(settings);
-  for (const char* side : {"left", "right"})
-    talos.addContact(makeSole(std::string("leg_") + side + "_sole_fix_joint"), side);
-  return talos;
-}
+DynaCoM makeTalos(FrictionModel friction) { return makeTalosOn(makeSole(friction)); }
+
+DynaCoM makeTalosOnOctagons() { return makeTalosOn(makeOctagon); }
 
 DynaCoM makeG1() {
   DynaCoMSettings settings;
@@ -92,15 +118,15 @@ DynaCoM makeG1() {
   return g1;
 }
 
-DynaCoM makeQuadruped() {
+DynaCoM makeQuadruped(FrictionModel friction) {
   return makeTrunk(
       {{0.42, 0.22, -0.5}, {0.30, -0.20, -0.5}, {-0.33, 0.20, -0.5}, {-0.38, -0.21, -0.5}},
-      makePoint);
+      makePoint(friction));
 }
 
-DynaCoM makePoints(int number) { return makeTrunk(around(number), makePoint); }
+DynaCoM makePoints(int number) { return makeTrunk(around(number), makePoint()); }
 
-DynaCoM makeSoles(int number) { return makeTrunk(around(number), makeSole); }
+DynaCoM makeSoles(int number) { return makeTrunk(around(number), makeSole()); }
 
 Wrench groundWrench(const DynaCoM& robot) {
   Wrench wrench;

@@ -2,8 +2,9 @@
 #pragma once
 
 #include <dynacom/dyna_com.hpp>
+#include <dynacom/surface_options.hpp>
 
-#include "eiquadprog.hpp"
+#include "peers.hpp"
 
 // The robots of the benchmarks, and what is asked of them.
 
@@ -15,11 +16,13 @@ using Wrench = Eigen::Matrix<double, 6, 1>;  // (force, moment) about the CoM
 constexpr double kFriction = 0.7, kYawFriction = 0.08, kHalfLength = 0.10, kHalfWidth = 0.06;
 
 // Talos, with its two soles, "left" and "right".
-DynaCoM makeTalos();
+DynaCoM makeTalos(FrictionModel friction = FrictionModel::OuterPyramid);
+// The same on soles without their corners: polygons of eight vertices.
+DynaCoM makeTalosOnOctagons();
 // Unitree's G1, with its two soles, as in python/dynacom/robots/g1.yaml.
 DynaCoM makeG1();
 // A trunk of 50 kg that stands on four points, in mid-stride.
-DynaCoM makeQuadruped();
+DynaCoM makeQuadruped(FrictionModel friction = FrictionModel::OuterPyramid);
 // The same trunk, on so many points or soles around it.
 DynaCoM makePoints(int number);
 DynaCoM makeSoles(int number);
