@@ -79,12 +79,11 @@ struct Row {
 
 // Where a contact is, from its NE = [R 0; [p]×R R].
 void place(const Contact& contact, DistributionProblem::Contact& placed) {
-  placed.rotation = contact.NE.topLeftCorner<3, 3>();
-  placed.lever.setZero();
-  for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Vector3d direction = contact.NE.col(axis).head<3>();
-    placed.lever += 0.5 * direction.cross(Eigen::Vector3d(contact.NE.col(axis).tail<3>()));
-  }
+  const auto R = contact.NE.topLeftCorner<3, 3>(), of_moment = contact.NE.bottomLeftCorner<3, 3>();
+  placed.rotation = R;
+  // Elements of [p]× = [p]×R Rᵀ.
+  placed.lever << of_moment.row(2).dot(R.row(1)), of_moment.row(0).dot(R.row(2)),
+      of_moment.row(1).dot(R.row(0));
 }
 
 // Gives a contact's share of a result its sizes.
@@ -513,8 +512,8 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
 void WrenchDistribution::Workspace::takeProblem() {
   bool same = added == solved;
   // Multipliers of the wrench do not know the order of contacts.
-  bool are_others = !same && !std::is_permutation(added.begin(), added.end(), solved.begin(),
-                                                  solved.end());
+  bool are_others =
+      !same && !std::is_permutation(added.begin(), added.end(), solved.begin(), solved.end());
   if (!same) rearrange();
   for (std::size_t k = 0; k < solved.size(); ++k) {
     Slot& slot = slots[solved[k]];
@@ -558,7 +557,8 @@ void WrenchDistribution::Workspace::takeSets() {
     if (!knows_all_sets) continue;
     problem.contacts[k].set = *slot.set;
     problem.contacts[k].weights = slot.weights;
-    problem.contacts[k].reference = slot.reference;
+    problem.contacts[k].reference.resize(slot.reference.isZero(0.) ? 0 : slot.reference.size());
+    if (problem.contacts[k].reference.size() > 0) problem.contacts[k].reference = slot.reference;
   }
 }
 
@@ -608,7 +608,7 @@ bool WrenchDistribution::Workspace::distributeBySets(double minimal_scale) {
   sets.setMaximalIterations(maximal_iterations);
   sets.setWarmStart(warm_start);
   const DistributionSolution& solution = sets.solve(problem);
-  result.scale = problem.scale();
+  if (has_sets) result.scale = problem.scale();
   result.status = solution.status;
   result.iterations = solution.iterations;
   if (result.status != DistributionStatus::Solved && result.status != DistributionStatus::Relaxed)
@@ -636,6 +636,7 @@ void WrenchDistribution::Workspace::writeMultipliers(const DistributionSolution&
   for (std::size_t k = 0; k < solved.size(); ++k) {
     Contact& contact = result.contacts[k];
     const auto& bounds = solution.bounds[k];
+    if (bounds.isZero()) continue;
     const auto write = [&](Eigen::Index row, const Row& side, double rest, double of_distance) {
       contact.active[row] = true;
       if (is_relaxed) contact.relaxation_multipliers[row] = std::max(0., of_distance / side.factor);

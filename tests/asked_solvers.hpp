@@ -27,10 +27,11 @@ inline dynacom::DistributionProblem::Contact describeBox(
                       : dynacom::ContactSet::surface(
                             section, dynacom::Section::rectangle(-half, half), limits[5]);
   described.weights = contact.weights;
-  described.rotation = contact.NE.leftCols<3>().topRows<3>();
-  for (int axis = 0; axis < 3; ++axis)
-    described.lever += 0.5 * Eigen::Vector3d(contact.NE.col(axis).head<3>())
-                                 .cross(Eigen::Vector3d(contact.NE.col(axis).tail<3>()));
+  // With the same rounding, [p]× = [p]×R Rᵀ.
+  const auto R = contact.NE.topLeftCorner<3, 3>(), of_moment = contact.NE.bottomLeftCorner<3, 3>();
+  described.rotation = R;
+  described.lever << of_moment.row(2).dot(R.row(1)), of_moment.row(0).dot(R.row(2)),
+      of_moment.row(1).dot(R.row(0));
   return described;
 }
 

@@ -103,8 +103,11 @@ void addPair(const Columns& columns, const Matrix2d& J, Sum&& sum) {
 // A contact in units of its cost, x = W λ.
 struct Block {
   int size = 3;
+  // What `set` is made of.
   bool is_described = false;
-  ContactSet described;              // what `set` is made of
+  ContactSet described;
+  DistributionProblem::Components described_weights;
+  double described_largest = 0.;
   Vector6 weights, inverse_weights;  // W over the largest weight of all
   bool has_reference = false;
   Vector6 reference;            // W λ₀ over the unit
@@ -142,13 +145,15 @@ struct Block {
     return wrench;
   }
 
-  // Adds e eᵀ.
+  // Adds the lower half of e eᵀ, which is all that Factors6 reads.
   void addFreeCompliance(Matrix6& sum) const {
-    sum.noalias() += e.leftCols<3>() * e.leftCols<3>().transpose();
-    if (size == 6) {
-      const auto moments = e.bottomRightCorner<3, 3>();
-      sum.bottomRightCorner<3, 3>().noalias() += moments * moments.transpose();
-    }
+    internal::unroll6([&](auto column) {
+      constexpr int i = column, below = 6 - i;
+      auto part = sum.col(i).template tail<below>();
+      for (int k = 0; k < 3; ++k) part += e(i, k) * e.col(k).template tail<below>();
+      if constexpr (i >= 3)
+        for (int k = 3; k < size; ++k) part += e(i, k) * e.col(k).template tail<below>();
+    });
   }
 
   // Adds e diag(friction, 0, moments, yaw) eᵀ.
@@ -231,9 +236,10 @@ void DistributionProblem::Contact::validate(const std::string& prefix) const {
 double DistributionProblem::scale() const {
   double force = minimal_scale;  // that there is in any case
   for (const Contact& contact : contacts) {
-    const Index n = contact.set.size();
-    const auto least = contact.set.lower().cwiseMax(-contact.set.upper()).head(n);
-    force = std::max(force, least.maxCoeff());
+    if (!contact.set.isCone()) {
+      const auto least = contact.set.lower().cwiseMax(-contact.set.upper());
+      force = std::max(force, least.head(contact.set.size()).maxCoeff());
+    }
     if (contact.reference.size() > 0)
       force = std::max(force, contact.reference.lpNorm<Eigen::Infinity>());
   }
@@ -367,34 +373,35 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
   blocks.resize(problem.contacts.size());
   directions.reserve(6 * blocks.size());
   largest_weight = 0.;
-  for (const auto& contact : problem.contacts) {
-    if (contact.weights.size() == 0) largest_weight = std::max(largest_weight, 1.);
-    for (Index i = 0; i < contact.weights.size(); ++i)
-      largest_weight = std::max(largest_weight, contact.weights[i]);
-  }
+  for (const auto& contact : problem.contacts)
+    largest_weight =
+        std::max(largest_weight, contact.weights.size() > 0 ? contact.weights.maxCoeff() : 1.);
   for (std::size_t k = 0; k < blocks.size(); ++k) {
     const DistributionProblem::Contact& contact = problem.contacts[k];
     Block& block = blocks[k];
     const Index n = contact.set.size();
     block.size = int(n);
-    Vector6 own = Vector6::Ones();
-    withSize(int(n), [&](auto size) {
-      if (contact.weights.size() > 0) own.head<size>() = contact.weights.template head<size>();
-      own.head<size>() /= largest_weight;
-    });
-    if (!block.is_described || block.weights != own || block.described != contact.set) {
-      block.weights = own;
-      block.inverse_weights = own.cwiseInverse();
+    if (!block.is_described || block.described_largest != largest_weight ||
+        block.described_weights.size() != contact.weights.size() ||
+        block.described_weights != contact.weights || block.described != contact.set) {
       block.described = contact.set;
-      block.set = block.face = ScaledSet(contact.set, own);
+      block.described_weights = contact.weights;
+      block.described_largest = largest_weight;
+      block.weights.setOnes();
+      if (contact.weights.size() > 0) block.weights.head(n) = contact.weights;
+      block.weights.head(n) /= largest_weight;
+      block.inverse_weights = block.weights.cwiseInverse();
+      block.set = block.face = ScaledSet(contact.set, block.weights);
+      block.set.setUnit(contact.set, block.weights, unit);
       block.is_described = true;
+    } else if (!contact.set.isCone()) {
+      block.set.setUnit(contact.set, block.weights, unit);
     }
     block.place(contact, weights);
-    block.set.setUnit(contact.set, own, unit);
     block.has_reference = contact.reference.size() > 0;
     block.reference.setZero();
     for (Index i = 0; i < contact.reference.size(); ++i)
-      block.reference[i] = contact.reference[i] * own[i] / unit;
+      block.reference[i] = contact.reference[i] * block.weights[i] / unit;
   }
 }
 
@@ -464,7 +471,7 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
       if (is_local) {
         if (residual.norm() < size) break;
         evaluate(start, which);
-        return false;
+        return size <= Tolerances::missing;  // that is rounding
       }
       const double end_slope = residual.dot(direction);
       const bool descends = end_slope <= 0.;
@@ -651,6 +658,7 @@ bool DistributionSolver::Workspace::reachOnFaces(Effort effort, const Matrix6& o
   const Matrix6 stiff = compliance * outside;
   evaluate(start, face);
   bool given = descend(face, 0., start, Tolerances::direct_steps, &stiff);
+  is_accurate = given;
   if (!given && effort != Effort::Little) {
     Vector6 centre = start;
     evaluate(start, face);
@@ -669,9 +677,9 @@ bool DistributionSolver::Workspace::reachOnFaces(Effort effort, const Matrix6& o
     // Multipliers of what faces do not give mean nothing.
     evaluate(multipliers - outside * multipliers, face);
     const double may_be_left = effort == Effort::All ? Tolerances::exposed : Tolerances::missing;
+    is_accurate = missing().norm() <= enough();
     given = missing().norm() <= std::max(may_be_left, enough());
   }
-  is_accurate = missing().norm() <= enough();
   may_lack = Tolerances::missing;
   return given;
 }
@@ -803,8 +811,10 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   solution.cost = 0.;
   const double largest = work.largest_weight;
   double sizes = 0.;  // of what the cost is a difference of
-  if (answered)
+  if (answered) {
     solution.multipliers = unit * largest * largest * work.weights.cwiseProduct(work.multipliers);
+    solution.achieved = unit * work.achieved.cwiseQuotient(work.weights);
+  }
   for (std::size_t k = 0; k < contacts; ++k) {
     DistributionProblem::Components& force = solution.forces[k];
     force.setZero(problem.contacts[k].set.size());
@@ -817,7 +827,6 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
     for (Index i = 0; i < force.size(); ++i) force[i] = unit * x[i] * block.inverse_weights[i];
     solution.cost += 0.5 * (x - block.reference).squaredNorm() * std::pow(unit * largest, 2);
     sizes += 0.5 * (x.squaredNorm() + block.reference.squaredNorm());
-    solution.achieved += unit * block.wrenchOf(x).cwiseQuotient(work.weights);
   }
   // What of the wrench is rounding has a price, by the multipliers.
   solution.is_accurate =

@@ -165,12 +165,7 @@ def half_frames(momentum):
 def find_change(report, settings, friction):
     found = report.examination
     robot = report.robot.dynacom()
-    for name in robot.getKnownContacts():
-        contact = robot.getContact(name)
-        own = contact.getSettings()
-        own.friction = friction
-        contact.initialize(own)
-    parts = dynacom.splitContacts(robot)
+    parts = dynacom.splitContacts(robot, friction=friction)
     change = dynacom.distanceToFeasible(
         parts, found.part_motions, found.analysis, found.inference.schedule, settings
     )
