@@ -334,6 +334,7 @@ struct DistributionSolver::Workspace {
   Factors6 factors;
   int iterations = 0, iterations_in_vain = 0;
   bool is_accurate = false;
+  bool is_found_at_once = false;  // by the first step of all: nothing else leads there faster
 
   using Which = ScaledSet Block::*;
   // What is tried for an answer out of reach: two steps on the faces, or as many as it takes, or
@@ -525,8 +526,10 @@ DistributionStatus DistributionSolver::Workspace::search() {
     iterations_in_vain = std::exchange(iterations, 0);
     is_accurate = true;
   }
-  if (startFree() && descend(&Block::set, 0., multipliers, Tolerances::direct_steps))
+  if (startFree() && descend(&Block::set, 0., multipliers, Tolerances::direct_steps)) {
+    is_found_at_once = iterations == 1;
     return DistributionStatus::Solved;
+  }
   if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
   const DistributionStatus status = approach(Tolerances::first_slack * findMeanCompliance(),
                                              Vector6::Zero(), Effort::Usual, Tolerances::rounds);
@@ -785,6 +788,7 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   const double unit = scale / overall_weight;
   work.iterations = work.iterations_in_vain = 0;
   work.is_accurate = true;
+  work.is_found_at_once = false;
   if (!problem.wrench.allFinite()) {
     solution.status = DistributionStatus::InvalidInput;
   } else if (contacts == 0) {
@@ -805,29 +809,31 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   const bool answered = contacts > 0 && scale > 0. &&
                         (solution.status == DistributionStatus::Solved ||
                          solution.status == DistributionStatus::Relaxed);
-  work.has_answer = answered;
+  work.has_answer = answered && !work.is_found_at_once;
   solution.achieved.setZero();
   solution.multipliers.setZero();
-  solution.cost = 0.;
   const double largest = work.largest_weight;
-  double sizes = 0.;  // of what the cost is a difference of
+  double cost = 0., sizes = 0.;  // the former a difference of the latter
   if (answered) {
     solution.multipliers = unit * largest * largest * work.weights.cwiseProduct(work.multipliers);
     solution.achieved = unit * work.achieved.cwiseQuotient(work.weights);
   }
   for (std::size_t k = 0; k < contacts; ++k) {
     DistributionProblem::Components& force = solution.forces[k];
-    force.setZero(problem.contacts[k].set.size());
     solution.bounds[k].setZero();
-    if (!answered) continue;
+    if (!answered) {
+      force.setZero(problem.contacts[k].set.size());
+      continue;
+    }
     const Block& block = work.blocks[k];
     const Vector6& x = block.response.force;
+    force = (unit * x.cwiseProduct(block.inverse_weights)).head(block.size);
     if (!block.response.is_free)
       solution.bounds[k] = block.set.findBounds(block.response, block.decidingPull(work.residual));
-    for (Index i = 0; i < force.size(); ++i) force[i] = unit * x[i] * block.inverse_weights[i];
-    solution.cost += 0.5 * (x - block.reference).squaredNorm() * std::pow(unit * largest, 2);
+    cost += 0.5 * (x - block.reference).squaredNorm();
     sizes += 0.5 * (x.squaredNorm() + block.reference.squaredNorm());
   }
+  solution.cost = cost * std::pow(unit * largest, 2);
   // What of the wrench is rounding has a price, by the multipliers.
   solution.is_accurate =
       work.is_accurate &&
