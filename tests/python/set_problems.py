@@ -17,6 +17,7 @@ from dynacom import (
     DistributionContact,
     DistributionProblem,
     DistributionSolution,
+    DistributionSolver,
     DistributionStatus,
     Section,
 )
@@ -254,6 +255,34 @@ def random_problem(rng: np.random.Generator, kind: str, number: int) -> Problem:
     if rng.integers(2):
         problem.minimal_scale = size
     return problem
+
+
+def make_problem(kind: str, number: int, seed: int = 0) -> Problem:
+    rng = np.random.default_rng([KINDS.index(kind), number, seed])
+    return random_problem(rng, kind, number)
+
+
+# By the library.
+
+
+def solve(problem: Problem) -> DistributionSolution:
+    return DistributionSolver().solve(problem.make())
+
+
+def size_of(problem: Problem, wrench: np.ndarray) -> float:
+    return np.linalg.norm(problem.wrench_weights * wrench)
+
+
+def unit_of(problem: Problem) -> float:
+    """The scale as a force; a newton where nothing is asked."""
+    return problem.make().scale() / problem.wrench_weights.max() or 1.0
+
+
+def cost_scale(problem: Problem, solution: DistributionSolution) -> float:
+    """What errors of the cost are relative to: no cost is counted from less than a force."""
+    largest = max(np.abs(force).max() for force in solution.forces)
+    least_weight = min(contact.weights.min() for contact in problem.contacts)
+    return solution.cost + 0.5 * (least_weight * max(largest, unit_of(problem))) ** 2
 
 
 # The same by Clarabel.

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-2-Clause
+"""Distributions over sets of every kind against Clarabel, an interior-point solver.
+
+scripts/reliability runs this file as a program: test_second_solver_of_sets.py PROBLEMS SEED.
+"""
+
+import multiprocessing
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from dynacom import DistributionStatus
+from set_problems import (
+    KINDS,
+    Problem,
+    cost_scale,
+    least_cost,
+    least_distance,
+    make_problem,
+    size_of,
+    solve,
+    unit_of,
+)
+
+SOLVED, RELAXED = DistributionStatus.Solved, DistributionStatus.Relaxed
+
+# Of the scale: a wrench this far from what the contacts can give may be called either.
+REACH = 1e-9, 1e-7
+# Of the scale, and of the cost.
+DISTANCE, COST = 1e-8, 1e-7
+# By which the closest wrench may be off; the closer it is, the more that turns the residual, and
+# with it the faces among which the cheapest forces are looked for.
+ACHIEVED = 1e-10
+
+
+@dataclass
+class Comparison:
+    """None where Clarabel has no answer."""
+
+    status: DistributionStatus
+    is_optimal: bool
+    size: float = 0.0  # of the residual, over the scale
+    distance: float | None = None  # the same, by Clarabel
+    cost_error: float | None = None
+
+    @property
+    def has_answer(self) -> bool:
+        return self.status in (SOLVED, RELAXED)
+
+    @property
+    def cost_tolerance(self) -> float:
+        return COST + (ACHIEVED / self.size if self.status == RELAXED else 0.0)
+
+    @property
+    def disagrees(self) -> str:
+        """In which way the answer is another than Clarabel's."""
+        if self.distance is not None:
+            solved = self.status == SOLVED
+            if (solved and self.distance > REACH[1]) or (not solved and self.distance < REACH[0]):
+                return f"{self.status}, but the distance is {self.distance:.1e}"
+            if not abs(self.size - self.distance) <= DISTANCE:
+                return f"the distance is {self.size:.10e}, not {self.distance:.10e}"
+        if self.cost_error is not None and not abs(self.cost_error) <= self.cost_tolerance:
+            return f"{self.status} {self.size:.1e}, the cost is off by {self.cost_error:.1e}"
+        return ""
+
+    @property
+    def wrong(self) -> str:
+        if not self.has_answer:
+            return str(self.status)
+        return self.disagrees or ("" if self.is_optimal else "isOptimal() is false")
+
+
+def compare(problem: Problem) -> Comparison:
+    solution = solve(problem)
+    unit = unit_of(problem)
+    scale = unit * problem.wrench_weights.max()
+    comparison = Comparison(
+        solution.status,
+        solution.isOptimal(problem.make()),
+        size_of(problem, solution.residual) / scale,
+    )
+    if not comparison.has_answer:
+        return comparison
+    distance = least_distance(problem, unit)
+    if distance is not None:
+        comparison.distance = distance * unit / scale
+    cost = least_cost(problem, solution, unit)
+    if cost is not None:
+        comparison.cost_error = (solution.cost - cost * unit**2) / cost_scale(problem, solution)
+    return comparison
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_clarabel_agrees(kind):
+    """In both stages: how close the closest wrench is, and what its cheapest forces cost."""
+    comparisons = [compare(make_problem(kind, number)) for number in range(300)]
+    wrong = {number: c.wrong for number, c in enumerate(comparisons) if c.wrong}
+    assert not wrong
+    for status in (SOLVED, RELAXED):
+        assert sum(c.status == status for c in comparisons) > 100
+    assert sum(c.distance is None for c in comparisons) < 30
+    assert sum(c.cost_error is None for c in comparisons) < 10
+
+
+# The campaign.
+
+
+def run(task: tuple[str, int, int]) -> Comparison:
+    return compare(make_problem(*task))
+
+
+def largest(errors: Iterator[float]) -> str:
+    return f"{max((abs(error) for error in errors), default=np.nan):.1e}"
+
+
+def main(problems: int, seed: int, processes: int | None = None) -> Iterator[str]:
+    """The campaign's table, line by line."""
+    yield (
+        "| sets | problems | Solved | Relaxed | without answer | not optimal | disagree "
+        "| no distance from Clarabel | no cost | distance | cost |"
+    )
+    yield f"|{'---|' * 11}"
+    with multiprocessing.Pool(processes) as pool:
+        for kind in KINDS:
+            tasks = [(kind, number, seed) for number in range(problems)]
+            comparisons = pool.map(run, tasks, chunksize=50)
+            for number, comparison in enumerate(comparisons):
+                if comparison.wrong:
+                    print(f"{kind} {number}: {comparison.wrong}", file=sys.stderr, flush=True)
+            answered = [c for c in comparisons if c.has_answer]
+            agreed = [c for c in answered if not c.disagrees]
+            cells = [
+                kind,
+                len(comparisons),
+                sum(c.status == SOLVED for c in answered),
+                sum(c.status == RELAXED for c in answered),
+                len(comparisons) - len(answered),
+                sum(not c.is_optimal for c in answered),
+                len(answered) - len(agreed),
+                sum(c.distance is None for c in answered),
+                sum(c.cost_error is None for c in answered),
+                largest(c.size - c.distance for c in agreed if c.distance is not None),
+                largest(c.cost_error for c in agreed if c.cost_error is not None),
+            ]
+            yield f"| {' | '.join(map(str, cells))} |"
+
+
+if __name__ == "__main__":
+    for text in main(*map(int, sys.argv[1:])):
+        print(text, flush=True)
