@@ -9,12 +9,13 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
 import pytest
 
 from dynacom import DistributionStatus
 from set_problems import (
     KINDS,
+    TOLERANCES,
+    Answer,
     Problem,
     cost_scale,
     least_cost,
@@ -29,7 +30,7 @@ SOLVED, RELAXED = DistributionStatus.Solved, DistributionStatus.Relaxed
 
 # Of the scale: a wrench this far from what the contacts can give may be called either.
 REACH = 1e-9, 1e-7
-# Of the scale, and of the cost.
+# Of the scale, and of the cost, besides ten times what Clarabel has kept.
 DISTANCE, COST = 1e-8, 1e-7
 # By which the closest wrench may be off; the closer it is, the more that turns the residual, and
 # with it the faces among which the cheapest forces are looked for.
@@ -43,28 +44,28 @@ class Comparison:
     status: DistributionStatus
     is_optimal: bool
     size: float = 0.0  # of the residual, over the scale
-    distance: float | None = None  # the same, by Clarabel
-    cost_error: float | None = None
+    distance: Answer | None = None  # the same, by Clarabel
+    cost_error: Answer | None = None
 
     @property
     def has_answer(self) -> bool:
         return self.status in (SOLVED, RELAXED)
 
     @property
-    def cost_tolerance(self) -> float:
-        return COST + (ACHIEVED / self.size if self.status == RELAXED else 0.0)
-
-    @property
     def disagrees(self) -> str:
         """In which way the answer is another than Clarabel's."""
         if self.distance is not None:
-            solved = self.status == SOLVED
-            if (solved and self.distance > REACH[1]) or (not solved and self.distance < REACH[0]):
-                return f"{self.status}, but the distance is {self.distance:.1e}"
-            if not abs(self.size - self.distance) <= DISTANCE:
-                return f"the distance is {self.size:.10e}, not {self.distance:.10e}"
-        if self.cost_error is not None and not abs(self.cost_error) <= self.cost_tolerance:
-            return f"{self.status} {self.size:.1e}, the cost is off by {self.cost_error:.1e}"
+            solved, (distance, kept) = self.status == SOLVED, self.distance
+            slack = 0.0 if kept == TOLERANCES[0] else 10.0 * kept
+            if distance - slack > REACH[1] if solved else distance + slack < REACH[0]:
+                return f"{self.status}, but the distance is {distance:.1e}"
+            if not abs(self.size - distance) <= DISTANCE + 10.0 * kept:
+                return f"the distance is {self.size:.10e}, not {distance:.10e}"
+        if self.cost_error is not None:
+            error, kept = self.cost_error
+            far = ACHIEVED / self.size if self.status == RELAXED else 0.0
+            if not abs(error) <= COST + 10.0 * kept + far:
+                return f"{self.status} {self.size:.1e}, the cost is off by {error:.1e}"
         return ""
 
     @property
@@ -87,10 +88,11 @@ def compare(problem: Problem) -> Comparison:
         return comparison
     distance = least_distance(problem, unit)
     if distance is not None:
-        comparison.distance = distance * unit / scale
+        comparison.distance = distance._replace(value=distance.value * unit / scale)
     cost = least_cost(problem, solution, unit)
     if cost is not None:
-        comparison.cost_error = (solution.cost - cost * unit**2) / cost_scale(problem, solution)
+        error = (solution.cost - cost.value * unit**2) / cost_scale(problem, solution)
+        comparison.cost_error = cost._replace(value=error)
     return comparison
 
 
@@ -102,7 +104,7 @@ def test_clarabel_agrees(kind):
     assert not wrong
     for status in (SOLVED, RELAXED):
         assert sum(c.status == status for c in comparisons) > 100
-    assert sum(c.distance is None for c in comparisons) < 30
+    assert sum(c.distance is None for c in comparisons) < 10
     assert sum(c.cost_error is None for c in comparisons) < 10
 
 
@@ -113,40 +115,53 @@ def run(task: tuple[str, int, int]) -> Comparison:
     return compare(make_problem(*task))
 
 
-def largest(errors: Iterator[float]) -> str:
-    return f"{max((abs(error) for error in errors), default=np.nan):.1e}"
+def tell(comparisons: list[Comparison]) -> list[object]:
+    """A line of the table."""
+    answered = [c for c in comparisons if c.has_answer]
+    agreed = [c for c in answered if not c.disagrees]
+    distances = [c.distance for c in answered]
+    costs = [c.cost_error for c in answered]
+    errors = {kept: 0.0 for kept in TOLERANCES}
+    for c in agreed:
+        if c.distance is not None:
+            error = abs(c.size - c.distance.value)
+            errors[c.distance.tolerance] = max(errors[c.distance.tolerance], error)
+    return [
+        len(comparisons),
+        sum(c.status == SOLVED for c in answered),
+        sum(c.status == RELAXED for c in answered),
+        len(comparisons) - len(answered),
+        sum(not c.is_optimal for c in answered),
+        len(answered) - len(agreed),
+        sum(d is not None and d.tolerance > TOLERANCES[0] for d in distances),
+        distances.count(None),
+        costs.count(None),
+        *(f"{error:.1e}" for error in errors.values()),
+        f"{max(abs(c.cost_error.value) for c in agreed if c.cost_error):.1e}",
+    ]
 
 
 def main(problems: int, seed: int, processes: int | None = None) -> Iterator[str]:
-    """The campaign's table, line by line."""
+    """The campaign's table, line by line; fails if answers disagree, or 1 in 500 lacks any."""
     yield (
         "| sets | problems | Solved | Relaxed | without answer | not optimal | disagree "
-        "| no distance from Clarabel | no cost | distance | cost |"
+        "| Clarabel: distance to 1e-8 only | no distance | no cost "
+        "| distance | to 1e-8 | cost |"
     )
-    yield f"|{'---|' * 11}"
+    yield f"|{'---|' * 13}"
+    failed = False
     with multiprocessing.Pool(processes) as pool:
         for kind in KINDS:
             tasks = [(kind, number, seed) for number in range(problems)]
             comparisons = pool.map(run, tasks, chunksize=50)
-            for number, comparison in enumerate(comparisons):
-                if comparison.wrong:
-                    print(f"{kind} {number}: {comparison.wrong}", file=sys.stderr, flush=True)
-            answered = [c for c in comparisons if c.has_answer]
-            agreed = [c for c in answered if not c.disagrees]
-            cells = [
-                kind,
-                len(comparisons),
-                sum(c.status == SOLVED for c in answered),
-                sum(c.status == RELAXED for c in answered),
-                len(comparisons) - len(answered),
-                sum(not c.is_optimal for c in answered),
-                len(answered) - len(agreed),
-                sum(c.distance is None for c in answered),
-                sum(c.cost_error is None for c in answered),
-                largest(c.size - c.distance for c in agreed if c.distance is not None),
-                largest(c.cost_error for c in agreed if c.cost_error is not None),
-            ]
-            yield f"| {' | '.join(map(str, cells))} |"
+            wrong = {number: c.wrong for number, c in enumerate(comparisons) if c.wrong}
+            for number, error in wrong.items():
+                print(f"{kind} {number}: {error}", file=sys.stderr, flush=True)
+            failed = failed or 500 * len(wrong) > problems
+            failed = failed or any(c.has_answer and c.disagrees for c in comparisons)
+            yield f"| {kind} | {' | '.join(map(str, tell(comparisons)))} |"
+    if failed:
+        sys.exit(1)
 
 
 if __name__ == "__main__":
