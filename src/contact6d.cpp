@@ -48,7 +48,7 @@ std::ostream& operator<<(std::ostream& out, const Contact6DSettings& settings) {
       << ", half_length=" << settings.half_length << ", half_width=" << settings.half_width
       << ", weights=[" << settings.weights.transpose() << "], frame_name='" << settings.frame_name
       << "'";
-  if (settings.coupled_yaw) out << ", coupled_yaw=" << settings.coupled_yaw;
+  if (settings.coupled_yaw) out << ", coupled_yaw=true";
   internal::write(out, settings);
   if (!settings.reference.isZero(0.))
     out << ", reference=[" << settings.reference.transpose() << "]";
