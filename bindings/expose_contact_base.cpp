@@ -74,9 +74,10 @@ void exposeContactBase() {
            "Weights of lambda in the cost, which squares them, (cols,).")
       .def("reg_b", &ContactBase::reg_b, bp::arg("self"), Copied(), "Zero, (cols,).")
       .def("getSet", &getSet, bp::arg("self"),
-           "The ContactSet of lambda, where it is another than uni_A lambda <= 0, fri_A lambda <= "
-           "0;\n"
-           "else None.")
+           "The ContactSet of lambda; None for kinds that are described by matrices alone.")
+      .def("isPyramid", &ContactBase::isPyramid, bp::arg("self"),
+           "Whether lambda is in the pyramid uni_A lambda <= 0, fri_A lambda <= 0, and the cost\n"
+           "pulls it to zero: then distributions have a multiplier for each of these inequalities.")
       .def("ne_A", DYNACOM_MATRIX(ContactBase, ne_A), bp::arg("self"),
            "Newton-Euler matrix, (6, cols): takes lambda to (force, moment) about the centre of\n"
            "mass in the world's axes, at the last updateNewtonEuler.")

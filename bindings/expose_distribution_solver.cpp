@@ -40,7 +40,9 @@ std::shared_ptr<Contact> makeContact(const ContactSet& set, const bp::object& ro
   return std::make_shared<Contact>(contact);
 }
 
-bp::object getNE(const Contact& self) { return toArray(self.NE()); }
+bp::object getNE(const Contact& self) {
+  return toArray(Eigen::Matrix<double, 6, Eigen::Dynamic>(self.NE()));
+}
 
 std::vector<Contact> toContacts(const bp::object& contacts) {
   requireSequence("contacts", contacts, "DistributionContact");

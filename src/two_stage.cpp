@@ -321,6 +321,8 @@ template <class Scalar>
 void TwoStageSolver<Scalar>::restrictToFace() {
   const Scalar least =
       std::max(Scalar(kMultiplied) * distance_.norm(), Tolerances<Scalar>::kMultiplierRounding);
+  relaxation_multipliers_ =
+      (relaxation_multipliers_.array() > least).select(relaxation_multipliers_, Scalar(0));
   face_.setZero(n_, n_);
   R_.setZero(n_, n_);
   Eigen::Index col = 0, row = 0;
@@ -346,7 +348,7 @@ void TwoStageSolver<Scalar>::restrictToFace() {
     };
 
     for (Eigen::Index j = row; j < row + rows && size < cols; ++j) {
-      if (!(relaxation_multipliers_[j] > least)) continue;
+      if (!(relaxation_multipliers_[j] > Scalar(0))) continue;
       const auto normal = slackened_.G.col(j).segment(6 + col, cols);
       if (!append(normal, Tolerances<Scalar>::kDependent * normal.norm())) continue;
       held_[col + size - 1] = j;

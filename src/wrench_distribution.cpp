@@ -531,6 +531,9 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
 // places have changed.
 void WrenchDistribution::Workspace::takeProblem() {
   bool same = added == solved;
+  // Multipliers of the wrench do not know the order of contacts.
+  bool are_others = !same && !std::is_permutation(added.begin(), added.end(), solved.begin(),
+                                                  solved.end());
   if (!same) rearrange();
   for (std::size_t k = 0; k < solved.size(); ++k) {
     Slot& slot = slots[solved[k]];
@@ -542,12 +545,14 @@ void WrenchDistribution::Workspace::takeProblem() {
       contact.A.bottomRows(slot.friction.rows()) = slot.friction;
       contact.weights = slot.weights;
       contact.reference = slot.reference;
+      are_others = true;
       slot.changed = same = false;
     }
     if (slot.moved) contact.NE.swap(slot.NE);
     slot.moved = false;
   }
   if (!same) takeSets();
+  if (are_others) sets.forget();
   if (knows_all_sets)
     for (std::size_t k = 0; k < solved.size(); ++k) place(result.contacts[k], problem.contacts[k]);
 }
@@ -560,7 +565,6 @@ void WrenchDistribution::Workspace::takeSets() {
     has_sets = has_sets || !slots[number].is_pyramid;
     knows_all_sets = knows_all_sets && slots[number].set;
   }
-  sets.forget();
   problem.contacts.resize(knows_all_sets ? solved.size() : 0);
   for (std::size_t k = 0; k < solved.size(); ++k) {
     const Slot& slot = slots[solved[k]];

@@ -35,7 +35,7 @@ struct Tolerances {
   // manual's, and what a controller can tell.
   static constexpr double reach = 1e-8;
   // What an answer may lack: what forces of doubles lose by levers and weights of a few decades.
-  static constexpr double missing = 1e-12;
+  static constexpr double missing = 5e-13;
   // By how many units in the last place of its terms a sum of some ten may be off.
   static constexpr double rounding = 8. * std::numeric_limits<double>::epsilon();
 
@@ -315,7 +315,10 @@ struct DistributionSolver::Workspace {
   double largest_weight = 0.;  // of the cost, of all contacts
   // What the last answer leaves to start from.
   bool has_answer = false;
-  Vector6 slackened = Vector6::Zero();  // multipliers from which the last Relaxed answer was found
+  // The multipliers from which the last Relaxed answer was found, and with which slack and centre
+  // these were.
+  Vector6 slackened = Vector6::Zero(), last_centre = Vector6::Zero();
+  double last_slack = 0.;
 
   // Of the multipliers at hand.
   Vector6 multipliers = Vector6::Zero(), achieved = Vector6::Zero();
@@ -327,6 +330,9 @@ struct DistributionSolver::Workspace {
   bool is_accurate = false;
 
   using Which = ScaledSet Block::*;
+  // What is tried for an answer out of reach: two steps on the faces, or as many as it takes, or
+  // these, too, where faces hardly span a direction, which is left out then.
+  enum class Effort { Little, Usual, All };
 
   void take(const DistributionProblem& problem, double unit, double overall_weight);
   void evaluate(const Vector6& nu, Which which);
@@ -342,13 +348,14 @@ struct DistributionSolver::Workspace {
   double enough() const { return std::max(may_lack, Tolerances::rounding * terms); }
   Vector6 missing() const { return target - achieved; }
   DistributionStatus search();
+  DistributionStatus approach(double slack, Vector6 centre, Effort effort, int rounds);
   bool isReachedWithoutSlack();
-  bool relax(const Vector6& start, bool is_certain = true);
-  bool spanFaces(bool is_certain, Matrix6& basis, int& rank, Vector6& fixed);
-  bool findResidual(bool is_certain, Matrix6& outside);
-  bool reachClosest(bool is_certain, const Vector6& start, const Matrix6& outside);
+  bool relax(const Vector6& start, Effort effort);
+  bool spanFaces(Effort effort, Matrix6& basis, int& rank, Vector6& fixed);
+  bool findResidual(Effort effort, Matrix6& outside);
+  bool reachClosest(Effort effort, const Vector6& start, const Matrix6& outside);
   bool exposesClearly();
-  bool reachOnFaces(const Matrix6& outside, double may_be_left);
+  bool reachOnFaces(Effort effort, const Matrix6& outside);
   std::vector<Vector6> directions;
 };
 
@@ -493,45 +500,57 @@ bool DistributionSolver::Workspace::startFree() {
 
 DistributionStatus DistributionSolver::Workspace::search() {
   residual.setZero();
-  const Which all = &Block::set;
   if (warm_start && has_answer) {
     const bool was_reached = solution.status == DistributionStatus::Solved;
     const Vector6 last = multipliers;
-    evaluate(was_reached ? last : slackened, all);
+    evaluate(was_reached ? last : slackened, &Block::set);
     if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
     if (was_reached) {
-      if (descend(all, 0., last, Tolerances::direct_steps)) return DistributionStatus::Solved;
+      if (descend(&Block::set, 0., last, Tolerances::direct_steps))
+        return DistributionStatus::Solved;
     } else {
-      if (relax(last)) return DistributionStatus::Relaxed;
-      const double slack = Tolerances::first_slack * findMeanCompliance();
-      descend(all, slack, Vector6::Zero(), Tolerances::direct_steps);
-      if (relax(last)) return DistributionStatus::Relaxed;
+      const DistributionStatus status = relax(last, Effort::Little)
+                                            ? DistributionStatus::Relaxed
+                                            : approach(last_slack, last_centre, Effort::Little, 1);
+      // Without all digits, an answer is not to depend on the last one.
+      if (status != DistributionStatus::NumericalFailure && is_accurate) return status;
     }
     iterations_in_vain = std::exchange(iterations, 0);
+    is_accurate = true;
   }
-  if (startFree() && descend(all, 0., multipliers, Tolerances::direct_steps))
+  if (startFree() && descend(&Block::set, 0., multipliers, Tolerances::direct_steps))
     return DistributionStatus::Solved;
   if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
+  const DistributionStatus status = approach(Tolerances::first_slack * findMeanCompliance(),
+                                             Vector6::Zero(), Effort::Usual, Tolerances::rounds);
+  return status == DistributionStatus::NumericalFailure && missing().norm() <= Tolerances::reach
+             ? DistributionStatus::Solved
+             : status;
+}
 
+// The proximal point method on the dual, which is the method of multipliers (Rockafellar 1976),
+// from the multipliers at hand.
+DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6 centre,
+                                                           Effort effort, int rounds) {
   is_accurate = false;
-  // The proximal point method on the dual, which is the method of multipliers (Rockafellar 1976).
-  const double compliance = findMeanCompliance();
-  const double least_slack = Tolerances::least_slack * compliance;
-  double slack = Tolerances::first_slack * compliance;
-  double former = std::numeric_limits<double>::infinity();
-  Vector6 centre = Vector6::Zero(), former_missing = Vector6::Zero();
-  for (int round = 0; round < Tolerances::rounds && iterations < maximal_iterations; ++round) {
-    descend(all, slack, centre, Tolerances::steps);
+  const double least_slack = Tolerances::least_slack * findMeanCompliance();
+  double former = 0.;
+  Vector6 former_missing = Vector6::Zero();
+  for (int round = 0; round < rounds && iterations < maximal_iterations; ++round) {
+    descend(&Block::set, slack, centre, Tolerances::steps);
     const Vector6 lacking = missing();
     const double size = lacking.norm();
     if (size <= Tolerances::reach && isReachedWithoutSlack()) return DistributionStatus::Solved;
     if (size <= enough()) return DistributionStatus::Solved;
     // What stays is out of reach, if it proves so.
     const bool stays = (lacking - former_missing).norm() <= 0.1 * size;
+    last_slack = slack;
+    last_centre = centre;
     if (round == 0 || stays) {
-      if (relax(multipliers)) return DistributionStatus::Relaxed;
+      if (relax(multipliers, effort)) return DistributionStatus::Relaxed;
       // No smaller slack will tell more.
-      if (slack <= least_slack && relax(multipliers, false)) return DistributionStatus::Relaxed;
+      if (slack <= least_slack && relax(multipliers, Effort::All))
+        return DistributionStatus::Relaxed;
     }
     former_missing = lacking;
     if (size > Tolerances::fall * former)
@@ -539,8 +558,7 @@ DistributionStatus DistributionSolver::Workspace::search() {
     former = size;
     centre = multipliers;
   }
-  return missing().norm() <= Tolerances::reach ? DistributionStatus::Solved
-                                               : DistributionStatus::NumericalFailure;
+  return DistributionStatus::NumericalFailure;
 }
 
 // Next to the answer, Newton's method without slack has all digits. Returns whether it is there, or
@@ -554,7 +572,7 @@ bool DistributionSolver::Workspace::isReachedWithoutSlack() {
 
 // An orthonormal basis of the wrenches that the faces span, and the wrench that all forces in them
 // share. Returns false if the rank is not certain, and is to be.
-bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, int& rank,
+bool DistributionSolver::Workspace::spanFaces(Effort effort, Matrix6& basis, int& rank,
                                               Vector6& fixed) {
   directions.clear();
   fixed.setZero();
@@ -565,8 +583,8 @@ bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, i
       directions.push_back(block.wrenchOf(span.axes.col(k)).normalized());
   }
   return internal::findSpan(directions, Tolerances::independent,
-                            is_certain ? Tolerances::dependent : Tolerances::independent, basis,
-                            rank);
+                            effort == Effort::All ? Tolerances::independent : Tolerances::dependent,
+                            basis, rank);
 }
 
 // What is missing of the closest wrench, from the forces at hand and a guess: the part of the
@@ -575,7 +593,7 @@ bool DistributionSolver::Workspace::spanFaces(bool is_certain, Matrix6& basis, i
 // those that it exposes.
 //
 // @param outside  the projector on what they do not span
-bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outside) {
+bool DistributionSolver::Workspace::findResidual(Effort effort, Matrix6& outside) {
   bool is_found = false, is_near = false;
   for (int step = 0; step < Tolerances::steps && !is_found; ++step) {
     Matrix6 bend = Matrix6::Zero();
@@ -590,7 +608,7 @@ bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outsi
     Matrix6 basis;
     int rank = 0;
     Vector6 fixed;
-    if (!spanFaces(is_certain, basis, rank, fixed) || rank == 6) return false;
+    if (!spanFaces(effort, basis, rank, fixed) || rank == 6) return false;
     outside.noalias() = Matrix6::Identity() - basis * basis.transpose();
     const Vector6 rest = target - fixed;
     if (!is_bent) {
@@ -624,8 +642,7 @@ bool DistributionSolver::Workspace::findResidual(bool is_certain, Matrix6& outsi
 }
 
 // The cheapest forces on the faces that give the target, from the multipliers at hand.
-// @param may_be_left  of the target
-bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double may_be_left) {
+bool DistributionSolver::Workspace::reachOnFaces(Effort effort, const Matrix6& outside) {
   const Which face = &Block::face;
   // What is missing of the target is to be accurate: nothing but rounding may be off.
   may_lack = 0.;
@@ -634,7 +651,7 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
   const Matrix6 stiff = compliance * outside;
   evaluate(start, face);
   bool given = descend(face, 0., start, Tolerances::direct_steps, &stiff);
-  if (!given) {
+  if (!given && effort != Effort::Little) {
     Vector6 centre = start;
     evaluate(start, face);
     double slack = Tolerances::first_slack * compliance, former = missing().norm();
@@ -651,8 +668,10 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
     }
     // Multipliers of what faces do not give mean nothing.
     evaluate(multipliers - outside * multipliers, face);
+    const double may_be_left = effort == Effort::All ? Tolerances::exposed : Tolerances::missing;
     given = missing().norm() <= std::max(may_be_left, enough());
   }
+  is_accurate = missing().norm() <= enough();
   may_lack = Tolerances::missing;
   return given;
 }
@@ -661,14 +680,13 @@ bool DistributionSolver::Workspace::reachOnFaces(const Matrix6& outside, double 
 // residual exposes, and the proof of both.
 //
 // What the minimum with slack lacks is nearly the residual.
-// @param start       from which multipliers on the forces are sought
-// @param is_certain  whether a direction that faces hardly span is not to be left out
-bool DistributionSolver::Workspace::relax(const Vector6& start, bool is_certain) {
+// @param start  from which multipliers on the forces are sought
+bool DistributionSolver::Workspace::relax(const Vector6& start, Effort effort) {
   residual = missing();
   if (residual.norm() > Tolerances::reach) {
     const Vector6 kept = multipliers;
     Matrix6 outside;
-    if (findResidual(is_certain, outside) && reachClosest(is_certain, start, outside)) {
+    if (findResidual(effort, outside) && reachClosest(effort, start, outside)) {
       slackened = kept;
       return true;
     }
@@ -679,15 +697,15 @@ bool DistributionSolver::Workspace::relax(const Vector6& start, bool is_certain)
 }
 
 // The cheapest forces that leave the residual, and the proof of both.
-bool DistributionSolver::Workspace::reachClosest(bool is_certain, const Vector6& start,
+bool DistributionSolver::Workspace::reachClosest(Effort effort, const Vector6& start,
                                                  const Matrix6& outside) {
   const Vector6 asked = target;
   target -= residual;
   multipliers = start - outside * start;
-  const bool given = reachOnFaces(outside, is_certain ? Tolerances::missing : Tolerances::exposed);
+  const bool given = reachOnFaces(effort, outside);
   target = asked;
   if (!given) return false;
-  if (!is_certain) residual = missing();
+  if (effort == Effort::All) residual = missing();
   const double size = residual.norm();
   // No reachable wrench is closer: forces are as far in the direction of the residual as any.
   double gap = 0.;
@@ -696,7 +714,8 @@ bool DistributionSolver::Workspace::reachClosest(bool is_certain, const Vector6&
     gap += std::max(0., block.set.support(pull, Tolerances::exposed * size * block.reach()) -
                             pull.dot(block.response.force));
   }
-  is_accurate = is_certain && size >= Tolerances::far * weights.maxCoeff() / weights.minCoeff() &&
+  is_accurate = is_accurate && effort != Effort::All &&
+                size >= Tolerances::far * weights.maxCoeff() / weights.minCoeff() &&
                 exposesClearly();
   return gap <= Tolerances::reach * size;
 }
@@ -775,7 +794,6 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   // An answer that the last one's multipliers lead to takes none; it counts as one all the same.
   solution.iterations = work.iterations + work.iterations_in_vain;
   if (contacts > 0 && scale > 0.) solution.iterations = std::max(1, solution.iterations);
-  solution.is_accurate = work.is_accurate;
   const bool answered = contacts > 0 && scale > 0. &&
                         (solution.status == DistributionStatus::Solved ||
                          solution.status == DistributionStatus::Relaxed);
@@ -784,6 +802,7 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   solution.multipliers.setZero();
   solution.cost = 0.;
   const double largest = work.largest_weight;
+  double sizes = 0.;  // of what the cost is a difference of
   if (answered)
     solution.multipliers = unit * largest * largest * work.weights.cwiseProduct(work.multipliers);
   for (std::size_t k = 0; k < contacts; ++k) {
@@ -797,8 +816,13 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
       solution.bounds[k] = block.set.findBounds(block.response, block.decidingPull(work.residual));
     for (Index i = 0; i < force.size(); ++i) force[i] = unit * x[i] * block.inverse_weights[i];
     solution.cost += 0.5 * (x - block.reference).squaredNorm() * std::pow(unit * largest, 2);
+    sizes += 0.5 * (x.squaredNorm() + block.reference.squaredNorm());
     solution.achieved += unit * block.wrenchOf(x).cwiseQuotient(work.weights);
   }
+  // What of the wrench is rounding has a price, by the multipliers.
+  solution.is_accurate =
+      work.is_accurate &&
+      work.multipliers.norm() * Tolerances::rounding * work.terms <= Tolerances::reach * sizes;
   // That of the closest wrench is known with more digits than the difference has.
   solution.residual = solution.status == DistributionStatus::Relaxed
                           ? Vector6(unit * work.residual.cwiseQuotient(work.weights))

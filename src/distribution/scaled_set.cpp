@@ -205,16 +205,18 @@ void ScaledSection::Edge::project(const Vector2d& point, double normal, Response
               offset * outward, (outward.dot(point) - normal * offset) * offset, offset * offset};
 }
 
-// The nearest of the edges that a point is beyond, or null.
+// The nearest of the edges that a point is beyond, or null: by the square of the distance less that
+// of the point's norm, since the latter leaves the former no digits where the section is small.
 const ScaledSection::Edge* ScaledSection::findEdge(const Vector2d& point, double normal) const {
   const Edge* nearest = nullptr;
   double least = std::numeric_limits<double>::infinity();
   for (const Edge& edge : *polygon_) {
-    const double beyond = edge.outward.dot(point) - normal * edge.offset;
-    if (beyond <= 0.) continue;
+    const double out = edge.outward.dot(point), depth = normal * edge.offset;
+    if (out <= depth) continue;
     const double place = edge.along().dot(point);
-    const double aside = std::max({normal * edge.begin - place, place - normal * edge.end, 0.});
-    const double distance = beyond * beyond + aside * aside;
+    const double nearest_place = std::clamp(place, normal * edge.begin, normal * edge.end);
+    const double distance =
+        depth * (depth - 2. * out) + nearest_place * (nearest_place - 2. * place);
     if (distance >= least) continue;
     least = distance;
     nearest = &edge;

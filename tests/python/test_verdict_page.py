@@ -46,7 +46,7 @@ def test_settings_and_their_defaults(text, root):
     """Each one once; those of repair stand in its own manual."""
     rows = table(text, "| setting | default")
     rows += table((root / "docs" / "repair.md").read_text(encoding="utf-8"), "| setting | default")
-    values = {"": None, "true": True, "false": False, "auto": "auto"}
+    values = {"": None, "null": None, "true": True, "false": False, "auto": "auto"}
     documented = {
         names(cell)[0]: values[default] if default in values else float(default)
         for cell, default, _ in rows
