@@ -60,7 +60,8 @@ DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const Contact6DSettin
 ///
 /// the last sign changing first (Caron, Pham and Nakamura, ICRA 2015); of inner pyramids μ is
 /// μ / √2 here, too. Such a contact has no set, getSet(): the robust solver distributes its forces,
-/// which takes longer, and it shares no wrench with contacts that are more than pyramids.
+/// which takes two to four times as long, and it shares no wrench with contacts that are more than
+/// pyramids.
 class DYNACOM_EXPORT Contact6D : public ContactBase {
  public:
   /// A contact that waits for initialize().

@@ -43,6 +43,7 @@ class Comparison:
 
     status: DistributionStatus
     is_optimal: bool
+    is_accurate: bool
     size: float = 0.0  # of the residual, over the scale
     distance: Answer | None = None  # the same, by Clarabel
     cost_error: Answer | None = None
@@ -82,6 +83,7 @@ def compare(problem: Problem) -> Comparison:
     comparison = Comparison(
         solution.status,
         solution.isOptimal(problem.make()),
+        solution.is_accurate,
         size_of(problem, solution.residual) / scale,
     )
     if not comparison.has_answer:
@@ -133,6 +135,7 @@ def tell(comparisons: list[Comparison]) -> list[object]:
         len(comparisons) - len(answered),
         sum(not c.is_optimal for c in answered),
         len(answered) - len(agreed),
+        sum(c.is_accurate for c in answered if c.disagrees),
         sum(d is not None and d.tolerance > TOLERANCES[0] for d in distances),
         distances.count(None),
         costs.count(None),
@@ -142,13 +145,16 @@ def tell(comparisons: list[Comparison]) -> list[object]:
 
 
 def main(problems: int, seed: int, processes: int | None = None) -> Iterator[str]:
-    """The campaign's table, line by line; fails if answers disagree, or 1 in 500 lacks any."""
+    """The campaign's table, line by line.
+
+    Fails if answers that are called accurate disagree, or if 1 in 500 is wrong in some way.
+    """
     yield (
         "| sets | problems | Solved | Relaxed | without answer | not optimal | disagree "
-        "| Clarabel: distance to 1e-8 only | no distance | no cost "
+        "| called accurate | Clarabel: distance to 1e-8 only | no distance | no cost "
         "| distance | to 1e-8 | cost |"
     )
-    yield f"|{'---|' * 13}"
+    yield f"|{'---|' * 14}"
     failed = False
     with multiprocessing.Pool(processes) as pool:
         for kind in KINDS:
@@ -158,7 +164,9 @@ def main(problems: int, seed: int, processes: int | None = None) -> Iterator[str
             for number, error in wrong.items():
                 print(f"{kind} {number}: {error}", file=sys.stderr, flush=True)
             failed = failed or 500 * len(wrong) > problems
-            failed = failed or any(c.has_answer and c.disagrees for c in comparisons)
+            failed = failed or any(
+                c.has_answer and c.is_accurate and c.disagrees for c in comparisons
+            )
             yield f"| {kind} | {' | '.join(map(str, tell(comparisons)))} |"
     if failed:
         sys.exit(1)
