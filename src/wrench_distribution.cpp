@@ -532,8 +532,8 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
 void WrenchDistribution::Workspace::takeProblem() {
   bool same = added == solved;
   // Multipliers of the wrench do not know the order of contacts.
-  bool are_others = !same && !std::is_permutation(added.begin(), added.end(), solved.begin(),
-                                                  solved.end());
+  bool are_others =
+      !same && !std::is_permutation(added.begin(), added.end(), solved.begin(), solved.end());
   if (!same) rearrange();
   for (std::size_t k = 0; k < solved.size(); ++k) {
     Slot& slot = slots[solved[k]];
