@@ -21,7 +21,15 @@ void exposeContact6D() {
                        "What describes a Contact6D. The defaults describe a frictionless point.",
                        bp::init<>(bp::arg("self")))
       .def_readwrite("mu", &Settings::mu, "Friction coefficient, >= 0.")
-      .def_readwrite("gu", &Settings::gu, "Yaw friction: |tau_z| <= gu f_z, >= 0 [m].")
+      .def_readwrite("gu", &Settings::gu,
+                     "Yaw friction: |tau_z| <= gu f_z, >= 0 [m]; without meaning with coupled_yaw.")
+      .def_readwrite(
+          "coupled_yaw", &Settings::coupled_yaw,
+          "Whether yaw is bounded by what friction at the four corners can give besides\n"
+          "the rest of the wrench, equation (27), rather than by gu; False by default.\n"
+          "For pyramids of four sides, without bounds and reference; such contacts are\n"
+          "described by matrices alone, and share no wrench with ones that are more than\n"
+          "pyramids.")
       .def_readwrite("half_length", &Settings::half_length, "Half extent along x, >= 0 [m].")
       .def_readwrite("half_width", &Settings::half_width, "Half extent along y, >= 0 [m].")
       .add_property("weights", getter(&Settings::weights), setter(&Settings::weights, "weights"),

@@ -270,7 +270,9 @@ void exposeDynaCoM() {
            "they can give. Each contact is given its force. Returns the DistributionStatus;\n"
            "getDistribution() has all.\n\n"
            "groundCoMForce: (3,) [N]; groundCoMTorque: (3,), about the centre of mass [N·m];\n"
-           "com: (3,), that of getCoM(), or getFeasibleAMVariation() means nothing [m].")
+           "com: (3,), that of getCoM(), or getFeasibleAMVariation() means nothing [m]. ValueError "
+           "if\n"
+           "active contacts cannot share a wrench, see WrenchDistribution.add().")
       .def("forgetAnswers", &DynaCoM::forgetAnswers, bp::arg("self"),
            "Forgets which inequalities were active, and forces that would be kept: the next\n"
            "distribution starts cold, and does not depend on those before.")

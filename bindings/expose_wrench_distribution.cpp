@@ -225,7 +225,8 @@ void exposeWrenchDistribution() {
       .def<void (WrenchDistribution::*)(const ContactBase&)>(
           "add", &WrenchDistribution::add, (bp::arg("self"), bp::arg("contact")),
           "Adds a contact, with the matrices that it has now, in the slot of its position.\n"
-          "ValueError if it was never initialised, or the slot is taken; NotReadyError if\n"
+          "ValueError if it was never initialised, the slot is taken, or one of the contacts has\n"
+          "no set, getSet(), and another is more than a pyramid; NotReadyError if\n"
           "updateNewtonEuler() never placed it.")
       .def("add", &addInSlot, (bp::arg("self"), bp::arg("contact"), bp::arg("slot")),
            "The same in another slot, for contacts that are not always the same ones. ValueError,\n"
@@ -234,7 +235,8 @@ void exposeWrenchDistribution() {
            "Adds a contact by its matrices, in the slot of its position: inequalities\n"
            "A lambda <= 0, (m, n); weights > 0 of the cost, (n,); NE, (6, n), takes lambda to the\n"
            "wrench about the centre of mass. ValueError if the sizes do not fit, A is not finite,\n"
-           "a weight is not finite and > 0, or the slot is taken.")
+           "a weight is not finite and > 0, the slot is taken, or another contact is more than a\n"
+           "pyramid.")
       .def(
           "solve", &solve, (bp::arg("self"), bp::arg("wrench"), bp::arg("minimalScale") = 0.),
           "Solves for the forces that give a wrench, (6,): force [N], moment [N·m] about the\n"

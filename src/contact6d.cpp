@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-2-Clause
 #include "dynacom/contact6d.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <ostream>
 
@@ -24,6 +25,12 @@ void Contact6DSettings::validate() const {
   requireField(reference.allFinite(), "Contact6DSettings.reference", "finite",
                reference.transpose());
   internal::validate(*this, "Contact6DSettings");
+  if (coupled_yaw && (!internal::isPyramid(*this) || !reference.isZero(0.)))
+    internal::throwInvalid(
+        "Contact6DSettings.coupled_yaw must be false unless friction is OuterPyramid or "
+        "InnerPyramid, without bounds of the normal force and without reference, got ",
+        friction, ", [", least_normal_force, ", ", greatest_normal_force, "], [",
+        reference.transpose(), "]");
   requireField(!frame_name.empty(), "Contact6DSettings.frame_name", "a frame's name", "''");
 }
 
@@ -31,8 +38,9 @@ std::string Contact6DSettings::to_string() const { return internal::concat(*this
 
 bool Contact6DSettings::operator==(const Contact6DSettings& other) const {
   return SurfaceOptions::operator==(other) && reference == other.reference && mu == other.mu &&
-         gu == other.gu && half_length == other.half_length && half_width == other.half_width &&
-         weights == other.weights && frame_name == other.frame_name;
+         gu == other.gu && coupled_yaw == other.coupled_yaw && half_length == other.half_length &&
+         half_width == other.half_width && weights == other.weights &&
+         frame_name == other.frame_name;
 }
 
 std::ostream& operator<<(std::ostream& out, const Contact6DSettings& settings) {
@@ -40,6 +48,7 @@ std::ostream& operator<<(std::ostream& out, const Contact6DSettings& settings) {
       << ", half_length=" << settings.half_length << ", half_width=" << settings.half_width
       << ", weights=[" << settings.weights.transpose() << "], frame_name='" << settings.frame_name
       << "'";
+  if (settings.coupled_yaw) out << ", coupled_yaw=true";
   internal::write(out, settings);
   if (!settings.reference.isZero(0.))
     out << ", reference=[" << settings.reference.transpose() << "]";
@@ -79,6 +88,16 @@ double Contact6D::getCoPMargin() const {
 
 double Contact6D::getYawUsage() const {
   if (cols() == 0) return ContactBase::getYawUsage();
+  if (settings_.coupled_yaw) {
+    const double mu = internal::getPyramidMu(settings_, settings_.mu);
+    const double dx = settings_.half_length, dy = settings_.half_width;
+    const auto need = [&](double sign) {
+      const auto& force = appliedForce();
+      return sign * force[5] + std::abs(dy * force[0] + sign * mu * force[3]) +
+             std::abs(dx * force[1] + sign * mu * force[4]);
+    };
+    return getUsage(std::max(need(1.), need(-1.)), mu * (dx + dy));
+  }
   return getUsage(std::abs(appliedForce()[5]), settings_.gu);
 }
 
@@ -122,6 +141,31 @@ void Contact6D::changeWeights(const Vector6& weights) {
 void Contact6D::updateMatrices() {
   const double dx = settings_.half_length;
   const double dy = settings_.half_width;
+  // Pyramids as the manual has them, whose settings a control loop may change, are in sizes that
+  // the compiler knows: that allocates nothing.
+  Eigen::Matrix<double, 5, 6> uni_A;
+  uni_A << 0., 0., -1., 0., 0., 0.,  //
+      0., 0., -dx, 0., -1., 0.,      //
+      0., 0., -dy, 1., 0., 0.,       //
+      0., 0., -dx, 0., 1., 0.,       //
+      0., 0., -dy, -1., 0., 0.;
+  const double mu = internal::getPyramidMu(settings_, settings_.mu);
+  Eigen::Matrix<double, 4, 6> sides;
+  sides << 1., 0., -mu, 0., 0., 0.,  //
+      0., 1., -mu, 0., 0., 0.,       //
+      -1., 0., -mu, 0., 0., 0.,      //
+      0., -1., -mu, 0., 0., 0.;
+  if (settings_.coupled_yaw) {
+    Eigen::Matrix<double, 12, 6> fri_A;
+    fri_A.topRows<4>() = sides;
+    Eigen::Index row = 4;
+    for (const double r : {1., -1.})
+      for (const double s : {1., -1.})
+        for (const double t : {1., -1.})
+          fri_A.row(row++) << s * dy, t * dx, -mu * (dx + dy), s * r * mu, t * r * mu, r;
+    setMatrices(uni_A, fri_A, settings_.weights);
+    return;
+  }
   const Section places = Section::rectangle({-dx, -dy}, {dx, dy});
   ContactSet set = ContactSet::surface(settings_.makeFriction(settings_.mu), places, settings_.gu);
   if (!internal::isPyramid(settings_) || !settings_.reference.isZero(0.)) {
@@ -131,22 +175,10 @@ void Contact6D::updateMatrices() {
                 settings_.reference, set);
     return;
   }
-  // Of pyramids as the manual has them, whose settings a control loop may change: in sizes that the
-  // compiler knows, which allocate nothing.
-  Eigen::Matrix<double, 5, 6> uni_A;
-  uni_A << 0., 0., -1., 0., 0., 0.,  //
-      0., 0., -dx, 0., -1., 0.,      //
-      0., 0., -dy, 1., 0., 0.,       //
-      0., 0., -dx, 0., 1., 0.,       //
-      0., 0., -dy, -1., 0., 0.;
-  const double mu = internal::getPyramidMu(settings_, settings_.mu);
   const double gu = settings_.gu;
   Eigen::Matrix<double, 6, 6> fri_A;
-  fri_A << 1., 0., -mu, 0., 0., 0.,  //
-      0., 1., -mu, 0., 0., 0.,       //
-      -1., 0., -mu, 0., 0., 0.,      //
-      0., -1., -mu, 0., 0., 0.,      //
-      0., 0., -gu, 0., 0., 1.,       //
+  fri_A.topRows<4>() = sides;
+  fri_A.bottomRows<2>() << 0., 0., -gu, 0., 0., 1.,  //
       0., 0., -gu, 0., 0., -1.;
   setMatrices(uni_A, fri_A, settings_.weights, set);
 }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <type_traits>
 #include <utility>
 
 #include "check.hpp"
@@ -122,6 +123,9 @@ class Gatherer {
     settings.friction = part.friction;
     settings.facets = part.facets;
     settings.facet_angle = part.facet_angle;
+    // What bounds yaw then is the friction of the corners, and their usage says how much.
+    if constexpr (std::is_same_v<Contact, Contact6D>)
+      if (std::exchange(settings.coupled_yaw, false)) settings.gu = 0.;
     contact.initialize(settings);
   }
 

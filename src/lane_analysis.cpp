@@ -294,6 +294,7 @@ std::optional<LaneCarrier> LaneCarrier::make(const Carrier& carrier, int lanes) 
       return std::nullopt;
     if (surface) {
       const Contact6DSettings& settings = surface->getSettings();
+      if (settings.coupled_yaw) return std::nullopt;
       betas.tail<3>() << settings.half_width, settings.half_length, settings.gu;
     }
     made.contacts_.push_back(description);

@@ -282,6 +282,7 @@ struct WrenchDistribution::Workspace {
 
   Slot& findSlot(std::size_t slot);
   Slot& takeSlot(std::size_t slot);
+  void requireShareable(const ContactBase* contact) const;
   void describe(Slot& slot, const ContactBase& contact);
   void describe(Slot& slot, const MatrixRef& unilaterality, const MatrixRef& friction,
                 const VectorRef& weights, const VectorRef& reference,
@@ -396,6 +397,22 @@ WrenchDistribution::Workspace::Slot& WrenchDistribution::Workspace::takeSlot(std
   return found;
 }
 
+// No solver knows both: what is described by matrices alone, and what is more than a pyramid.
+// Without a contact it is of the former.
+void WrenchDistribution::Workspace::requireShareable(const ContactBase* contact) const {
+  const bool has_set = contact && contact->getSet();
+  if (has_set && contact->isPyramid()) return;
+  const auto other = std::find_if(added.begin(), added.end(), [&](std::size_t number) {
+    return has_set ? !slots[number].set : !slots[number].is_pyramid;
+  });
+  if (other == added.end()) return;
+  constexpr const char* kMatrices = "described by its matrices alone, as soles of coupled yaw are";
+  constexpr const char* kMore = "more than a pyramid";
+  throwInvalid("contact '", contact ? contact->getFrameName() : "A", "' is ",
+               has_set ? kMore : kMatrices, ": it cannot share a wrench with that of slot ", *other,
+               ", which is ", has_set ? kMatrices : kMore);
+}
+
 // What is the same as before is not written: this happens at every tick.
 void WrenchDistribution::Workspace::describe(Slot& slot, const ContactBase& contact) {
   if (slot.revision == contact.getRevision()) return;
@@ -483,6 +500,7 @@ void WrenchDistribution::add(const ContactBase& contact, std::size_t slot) {
     throw NotReadyError("contact '" + contact.getFrameName() +
                         "' is used before updateNewtonEuler()");
   Workspace& work = use();
+  work.requireShareable(&contact);
   Workspace::Slot& taken = work.takeSlot(slot);
   work.describe(taken, contact);
   taken.NE = contact.ne_A();
@@ -499,6 +517,7 @@ void WrenchDistribution::add(const Eigen::Ref<const Eigen::MatrixXd>& A,
   if (!weights.allFinite() || !(weights.array() > 0.).all())
     throwInvalid("weights must be finite and > 0, got ", weights.transpose());
   Workspace& work = use();
+  work.requireShareable(nullptr);
   Workspace::Slot& taken = work.takeSlot(work.added.size());
   const Eigen::MatrixXd no_friction(0, A.cols());
   work.describe(taken, A, no_friction, weights, Eigen::VectorXd::Zero(weights.size()), std::nullopt,
@@ -545,10 +564,6 @@ void WrenchDistribution::Workspace::takeSets() {
     has_sets = has_sets || !slots[number].is_pyramid;
     knows_all_sets = knows_all_sets && slots[number].set;
   }
-  if (has_sets && !knows_all_sets)
-    throwInvalid(
-        "contacts that are given by matrices alone cannot share a wrench with ones that are more "
-        "than pyramids");
   problem.contacts.resize(knows_all_sets ? solved.size() : 0);
   for (std::size_t k = 0; k < solved.size(); ++k) {
     const Slot& slot = slots[solved[k]];

@@ -12,8 +12,12 @@ namespace dynacom {
 struct DYNACOM_EXPORT Contact6DSettings : SurfaceOptions {
   /// Friction coefficient μ ≥ 0.
   double mu = 0.;
-  /// Yaw friction coefficient γ ≥ 0: |τ_z| ≤ γ f_z [m].
+  /// Yaw friction coefficient γ ≥ 0: |τ_z| ≤ γ f_z [m]. Without meaning where yaw is coupled.
   double gu = 0.;
+  /// Whether yaw is bounded by what friction at the four corners can give besides the rest of the
+  /// wrench, equation (27), rather than by γ. For pyramids of four sides without bounds and
+  /// reference; see Contact6D.
+  bool coupled_yaw = false;
   /// Half of the rectangle's extent along x, ≥ 0 [m].
   double half_length = 0.;
   /// Half of the rectangle's extent along y, ≥ 0 [m].
@@ -48,6 +52,16 @@ DYNACOM_EXPORT std::ostream& operator<<(std::ostream& out, const Contact6DSettin
 /// The pyramid circumscribes the friction cone: on its diagonals it allows √2 μ f_z.
 /// dx is half_length, dy half_width, γ is gu; R and p are the orientation and the position of the
 /// contact's frame, c is the CoM.
+///
+/// With coupled_yaw these inequalities are those of a force at each corner within the pyramid:
+/// eight rows take the place of the last two of C, for the signs r, s, t = ±1 the rows
+///
+///     r τ_z + s (dy f_x + r μ τ_x) + t (dx f_y + r μ τ_y) ≤ μ (dx + dy) f_z                 (27)
+///
+/// the last sign changing first (Caron, Pham and Nakamura, ICRA 2015); of inner pyramids μ is
+/// μ / √2 here, too. Such a contact has no set, getSet(): the robust solver distributes its forces,
+/// which takes two to four times as long, and it shares no wrench with contacts that are more than
+/// pyramids.
 class DYNACOM_EXPORT Contact6D : public ContactBase {
  public:
   /// A contact that waits for initialize().
@@ -68,6 +82,7 @@ class DYNACOM_EXPORT Contact6D : public ContactBase {
   Eigen::Matrix2Xd getCorners() const override;
   double getFrictionUsage() const override;
   double getCoPMargin() const override;
+  /// Where yaw is coupled, how much of f_z the rest of the wrench needs by (27), 1 at the limit.
   double getYawUsage() const override;
 
   /// Each throws std::invalid_argument where the value is out of the range that Contact6DSettings

@@ -34,7 +34,7 @@ struct DYNACOM_EXPORT PartRobot {
 /// Contact6D is one part for each of its corners, `front_left`, `front_right`, `rear_left` and
 /// `rear_right` (x is forward, y is left): points whose normal is vertical, with the surface's μ.
 /// The weights of their forces are those of the surface times √4, so that an evenly loaded surface
-/// costs as much; γ is left to the corners' friction.
+/// costs as much; γ is left to the corners' friction, which is what coupled yaw is, too.
 ///
 /// Bodies are points, too, each of which pushes along the vertical, with the least μ of the
 /// contacts and the weights of the first part of these; where the robot has no contacts, with μ =
@@ -49,7 +49,8 @@ DYNACOM_EXPORT PartRobot splitContacts(const DynaCoM& robot,
 
 /// What the contacts of a robot do, from what their parts do: a contact is active if any of its
 /// parts is, and its wrench is the sum of theirs, in its own axes about its own origin. The forces
-/// of bodies are summed up, too. All else is as in the analysis of the parts, whose contacts become
+/// of bodies are summed up, too. The yaw usage of soles of coupled yaw is NaN: what their corners
+/// use has it. All else is as in the analysis of the parts, whose contacts become
 /// MotionAnalysis::parts.
 /// @param robot     whose contacts were split
 /// @param contacts  of computeContactMotions() for that robot

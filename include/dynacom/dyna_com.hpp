@@ -280,6 +280,8 @@ class DYNACOM_EXPORT DynaCoM {
   /// @param groundCoMTorque  about the CoM [N·m]
   /// @param com              position of the CoM, which the moments are about [m]; that of
   ///                         getCoM(), or getFeasibleAMVariation() means nothing
+  /// @throws std::invalid_argument if active contacts cannot share a wrench: soles of coupled yaw
+  ///         and ones that are more than pyramids, see WrenchDistribution::add()
   DistributionStatus distributeForce(const Eigen::Vector3d& groundCoMForce,
                                      const Eigen::Vector3d& groundCoMTorque,
                                      const Eigen::Vector3d& com);

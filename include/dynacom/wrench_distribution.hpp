@@ -149,8 +149,10 @@ class DYNACOM_EXPORT WrenchDistribution {
   void clear();
 
   /// Adds a contact, with the matrices that it has now, in the slot of its position.
-  /// @throws std::invalid_argument if the contact was never initialised, or the slot is taken;
-  ///         NotReadyError if it was never placed by updateNewtonEuler()
+  /// @throws std::invalid_argument if the contact was never initialised, the slot is taken, or one
+  ///         of the contacts is described by its matrices alone, ContactBase::getSet(), and another
+  ///         is more than a pyramid, ContactBase::isPyramid(); NotReadyError if it was never placed
+  ///         by updateNewtonEuler()
   void add(const ContactBase& contact);
 
   /// The same in another slot, as in reserve(), for contacts that are not always the same ones.
@@ -161,7 +163,7 @@ class DYNACOM_EXPORT WrenchDistribution {
   /// @param weights  wᵢ > 0 of the cost, n
   /// @param NE       takes λ to the wrench about the CoM, 6 × n
   /// @throws std::invalid_argument if the sizes do not fit, n is 0, A is not finite, a weight is
-  ///         not finite and > 0, or the slot is taken
+  ///         not finite and > 0, the slot is taken, or another contact is more than a pyramid
   void add(const Eigen::Ref<const Eigen::MatrixXd>& A,
            const Eigen::Ref<const Eigen::VectorXd>& weights,
            const Eigen::Ref<const Eigen::Matrix<double, 6, Eigen::Dynamic>>& NE);

@@ -30,7 +30,7 @@ ALIASES = {
 # Fields that the old interface does not know.
 _LATER = (
     *("friction", "facets", "facet_angle", "least_normal_force", "greatest_normal_force"),
-    *("placement", "reference"),
+    *("placement", "reference", "coupled_yaw"),
 )
 
 

@@ -19,6 +19,7 @@ A robot file is YAML::
         gu: 0.05
         half_length: 0.1
         half_width: 0.05
+        coupled_yaw: false    # optional
         # kind point only, optional
         world_aligned: true
         radius: 0.02
@@ -448,7 +449,7 @@ _CONTACT_KEYS = {
     "6d": _Keys(
         _PLACE_REQUIRED
         | {"mu": _number, "gu": _number, "half_length": _number, "half_width": _number},
-        _PLACE_OPTIONAL | {"weights": _numbers(6)} | _FRICTION_KEYS,
+        _PLACE_OPTIONAL | {"weights": _numbers(6), "coupled_yaw": _boolean} | _FRICTION_KEYS,
     ),
 }
 

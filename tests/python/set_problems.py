@@ -6,6 +6,7 @@ Sections are told by their vertices, or by a radius; what is inside of them is a
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import clarabel
 import numpy as np
@@ -17,6 +18,7 @@ from dynacom import (
     DistributionContact,
     DistributionProblem,
     DistributionSolution,
+    DistributionSolver,
     DistributionStatus,
     Section,
 )
@@ -28,6 +30,8 @@ UP_FORCE = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # of wrenches and forces, across y = 0
 # More than any program has.
 VARIABLES = 1000
+# Of Clarabel: what is asked for, and what will do. It does not always arrive at the former.
+TOLERANCES = 1e-10, 1e-8
 # Of the residual, a component that exposes a face.
 EXPOSED = 1e-7
 
@@ -167,6 +171,13 @@ class Problem:
         return replace(self, contacts=contacts, wrench=MIRROR * self.wrench)
 
 
+class Answer(NamedTuple):
+    """Clarabel's."""
+
+    value: float
+    tolerance: float  # that it has kept
+
+
 # Random problems.
 
 
@@ -256,6 +267,34 @@ def random_problem(rng: np.random.Generator, kind: str, number: int) -> Problem:
     return problem
 
 
+def make_problem(kind: str, number: int, seed: int = 0) -> Problem:
+    rng = np.random.default_rng([KINDS.index(kind), number, seed])
+    return random_problem(rng, kind, number)
+
+
+# By the library.
+
+
+def solve(problem: Problem) -> DistributionSolution:
+    return DistributionSolver().solve(problem.make())
+
+
+def size_of(problem: Problem, wrench: np.ndarray) -> float:
+    return np.linalg.norm(problem.wrench_weights * wrench)
+
+
+def unit_of(problem: Problem) -> float:
+    """The scale as a force; a newton where nothing is asked."""
+    return problem.make().scale() / problem.wrench_weights.max() or 1.0
+
+
+def cost_scale(problem: Problem, solution: DistributionSolution) -> float:
+    """What errors of the cost are relative to: no cost is counted from less than a force."""
+    largest = max(np.abs(force).max() for force in solution.forces)
+    least_weight = min(contact.weights.min() for contact in problem.contacts)
+    return solution.cost + 0.5 * (least_weight * max(largest, unit_of(problem))) ** 2
+
+
 # The same by Clarabel.
 
 
@@ -292,8 +331,8 @@ class Program:
         own = S > 1e-10
         return Vt[own], (U[:, own].T @ (b / lengths)) / S[own]
 
-    def minimise(self, P: np.ndarray, q: np.ndarray) -> object | None:
-        """None if Clarabel has no full answer."""
+    def minimise(self, P: np.ndarray, q: np.ndarray) -> Answer | None:
+        """None if Clarabel does not arrive at either tolerance."""
         A, b = self._equations()
         matrices, constants, cones = [A], [b], [clarabel.ZeroConeT(len(b))]
         for A, b, cone in self._rows:
@@ -305,7 +344,10 @@ class Program:
         options = clarabel.DefaultSettings()
         options.verbose = False
         options.max_iter = 500
-        options.tol_gap_abs = options.tol_gap_rel = options.tol_feas = 1e-10
+        full, reduced = TOLERANCES
+        options.tol_gap_abs = options.tol_gap_rel = options.tol_feas = full
+        options.reduced_tol_gap_abs = options.reduced_tol_gap_rel = reduced
+        options.reduced_tol_feas = reduced
         # What helps it to arrive there.
         options.max_step_fraction = 0.95
         options.iterative_refinement_max_iter = 50
@@ -318,7 +360,10 @@ class Program:
             cones,
             options,
         ).solve()
-        return solution if solution.status == clarabel.SolverStatus.Solved else None
+        kept = {clarabel.SolverStatus.Solved: full, clarabel.SolverStatus.AlmostSolved: reduced}
+        if solution.status not in kept:
+            return None
+        return Answer(solution.obj_val, kept[solution.status])
 
 
 def add_section(
@@ -370,7 +415,7 @@ def add_contact(program: Program, contact: Contact, unit: float) -> np.ndarray:
     return forces
 
 
-def least_distance(problem: Problem, unit: float) -> float | None:
+def least_distance(problem: Problem, unit: float) -> Answer | None:
     """The least ‖D (w − Σ NE λ)‖, in units: a second-order cone program."""
     program = Program()
     (distance,) = program.variables(1)
@@ -383,11 +428,10 @@ def least_distance(problem: Problem, unit: float) -> float | None:
     program.add(clarabel.SecondOrderConeT, constants, [program.row((distance, 1.0)), *missing])
     q = np.zeros(program.size)
     q[distance] = 1.0
-    solution = program.minimise(np.zeros((program.size, program.size)), q)
-    return None if solution is None else solution.obj_val
+    return program.minimise(np.zeros((program.size, program.size)), q)
 
 
-def least_cost(problem: Problem, solution: DistributionSolution, unit: float) -> float | None:
+def least_cost(problem: Problem, solution: DistributionSolution, unit: float) -> Answer | None:
     """The least ½ Σ ‖W (λ − λ₀)‖² of forces that give the achieved wrench, in units squared.
 
     Where the wrench is out of reach, these are on the faces that the residual exposes.
@@ -412,4 +456,4 @@ def least_cost(problem: Problem, solution: DistributionSolution, unit: float) ->
         q[variable] = -square * references[variable]
         constant += 0.5 * square * references[variable] ** 2
     answer = program.minimise(P, q)
-    return None if answer is None else answer.obj_val + constant
+    return answer and answer._replace(value=answer.value + constant)

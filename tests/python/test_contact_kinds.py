@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import dynacom
 from dynacom import DistributionStatus, FrictionModel
-from helpers import sole_settings
+from helpers import inequalities, sole_settings
 
 SOLE = {"mu": 0.5, "gu": 0.05, "half_length": 0.1, "half_width": 0.06}
 
@@ -124,3 +124,73 @@ def test_a_polygon_and_a_placement(talos, talos_standing):
     # The same places are pressed on, though costs are of moments about another point.
     assert moved.status == plain.status == DistributionStatus.Solved
     assert_allclose(moved.achieved, plain.achieved, atol=1e-6)
+
+
+# Coupled yaw.
+
+
+def test_soles_of_coupled_yaw_give_what_their_corners_give(talos, talos_standing):
+    robot = standing(talos, coupled_yaw=True)
+    corners = dynacom.splitContacts(robot, friction=FrictionModel.OuterPyramid).robot
+    assert robot.getContact("left").getSet() is None
+    weight = robot.getMass() * 9.81
+    statuses = set()
+    for push, yaw in ((0.0, 0.02), (0.2, 0.02), (0.49, 0.02), (0.0, 0.2), (0.3, 0.2), (0.6, 0.1)):
+        results = []
+        for one in (robot, corners):
+            share(one, talos_standing)
+            force = one.getGroundCoMForce() + np.array([push * weight, 0.0, 0.0])
+            torque = one.getGroundCoMTorque() + np.array([0.0, -0.8 * push, yaw]) * weight
+            statuses.add(one.distributeForce(force, torque, one.getCoM()))
+            results.append(one.getDistribution())
+        soles, points = results
+        assert soles.isOptimal()
+        assert points.isOptimal()
+        assert soles.status == points.status
+        assert_allclose(soles.achieved, points.achieved, atol=1e-6 * weight)
+        assert all(
+            0.0 <= robot.getContactYawUsage(side) <= 1.0 + 1e-9 for side in ("left", "right")
+        )
+    assert statuses == {DistributionStatus.Solved, DistributionStatus.Relaxed}
+    assert robot.computeWrenchMargin().margin == 0.0
+
+
+def test_soles_of_coupled_yaw_beside_a_hand_are_refused(talos, talos_standing):
+    robot = standing(talos, coupled_yaw=True)
+    settings = dynacom.ContactGraspSettings()
+    settings.lower, settings.upper = [-500.0] * 3 + [-50.0] * 3, [500.0] * 3 + [50.0] * 3
+    settings.frame_name = "gripper_right_base_link"
+    robot.addContact(dynacom.ContactGrasp(settings), "hand")
+    with pytest.raises(
+        ValueError, match="contact 'gripper_right_base_link' is more than a pyramid"
+    ):
+        share(robot, talos_standing)
+    robot.deactivateContact("hand")
+    assert share(robot, talos_standing).status == DistributionStatus.Solved
+
+
+def test_motions_of_soles_of_coupled_yaw(talos, talos_motion):
+    """Whole, they are distributed by their rows; in parts, they are corners as any sole is."""
+    motion = dynacom.Motion(*(talos_motion[key] for key in "tqva"))
+    schedule = dynacom.ContactSchedule(["left", "right"], talos_motion["contacts"])
+    robot, plain = standing(talos, coupled_yaw=True), standing(talos)
+    whole = dynacom.analyzeMotion(robot, motion, schedule)
+    for contact in whole.contacts:
+        loaded = contact.active & (contact.vertical_force > 1.0)
+        assert loaded.sum() > 20
+        rows = inequalities(robot.getContact(contact.name))
+        assert (contact.wrench[loaded] @ rows.T).max() <= 1e-6
+        assert np.nanmax(contact.yaw_usage) <= 1.0 + 1e-9
+    gathered = []
+    for one in (robot, plain):
+        split = dynacom.splitContacts(one)
+        names = [part.name for part in split.parts]
+        active = np.repeat(talos_motion["contacts"], 4, axis=1)
+        parts = dynacom.analyzeMotion(split.robot, motion, dynacom.ContactSchedule(names, active))
+        motions = [dynacom.computeContactMotions(r, motion) for r in (one, split.robot)]
+        gathered.append(dynacom.gatherParts(one, split, *motions, parts))
+    for coupled, other in zip(gathered[0].contacts, gathered[1].contacts, strict=True):
+        assert_allclose(coupled.wrench, other.wrench)
+        assert_allclose(coupled.friction_usage, other.friction_usage)
+        assert np.isnan(coupled.yaw_usage).all()
+        assert not np.isnan(other.yaw_usage).all()

@@ -112,6 +112,7 @@ DEFAULTS = [
             "weights": np.ones(6),
             "frame_name": "",
             "reference": np.zeros(6),
+            "coupled_yaw": False,
             **OPTIONS,
         },
     ),
@@ -126,6 +127,7 @@ OTHER_VALUES = {
     "frame_name": "sole",
     "urdf": "robot.urdf",
     "world_aligned": True,
+    "coupled_yaw": True,
     "friction": FrictionModel.Cone,
     "facets": 16,
     "facet_angle": 0.125,
@@ -173,7 +175,8 @@ def test_settings_print_every_field(cls, field):
     before = str(settings)
     setattr(settings, field, other_value(settings, field))
     # Options are printed where they are other than by default.
-    assert f"{field}=" in (str(settings) if field in OPTIONS or field == "reference" else before)
+    optional = field in OPTIONS or field in ("reference", "coupled_yaw")
+    assert f"{field}=" in (str(settings) if optional else before)
     assert str(settings) != before
     assert str(settings) == repr(settings) == settings.to_string()
     assert cls.__name__ in repr(settings)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-2-Clause
-"""Distributions over sets of every kind: against Clarabel, and by identities."""
+"""Distributions over sets of every kind, by identities; test_second_solver_of_sets.py has more."""
 
 import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +14,6 @@ from dynacom import (
     ContactSet,
     DistributionContact,
     DistributionProblem,
-    DistributionSolution,
     DistributionSolver,
     DistributionStatus,
     Section,
@@ -27,107 +26,14 @@ from set_problems import (
     Contact,
     Problem,
     Shape,
-    least_cost,
-    least_distance,
-    random_problem,
+    cost_scale,
+    make_problem,
+    size_of,
+    solve,
+    unit_of,
 )
 
 SOLVED, RELAXED = DistributionStatus.Solved, DistributionStatus.Relaxed
-
-# Of the scale: a wrench this far from what the contacts can give may be called either.
-REACH = 1e-9, 1e-7
-# Of the scale, and of the cost.
-DISTANCE, COST = 1e-8, 1e-7
-# By which the closest wrench may be off; the closer it is, the more that turns the residual, and
-# with it the faces among which the cheapest forces are looked for.
-ACHIEVED = 1e-10
-
-
-def solve(problem: Problem) -> DistributionSolution:
-    return DistributionSolver().solve(problem.make())
-
-
-def make_problem(kind: str, number: int) -> Problem:
-    return random_problem(np.random.default_rng([KINDS.index(kind), number]), kind, number)
-
-
-def size_of(problem: Problem, wrench: np.ndarray) -> float:
-    return np.linalg.norm(problem.wrench_weights * wrench)
-
-
-def cost_scale(problem: Problem, solution: DistributionSolution) -> float:
-    """What errors of the cost are relative to: no cost is counted from less than a force."""
-    largest = max(np.abs(force).max() for force in solution.forces)
-    least_weight = min(contact.weights.min() for contact in problem.contacts)
-    return solution.cost + 0.5 * (least_weight * max(largest, unit_of(problem))) ** 2
-
-
-def unit_of(problem: Problem) -> float:
-    """The scale as a force; a newton where nothing is asked."""
-    return problem.make().scale() / problem.wrench_weights.max() or 1.0
-
-
-@dataclass
-class Comparison:
-    """None where Clarabel has no answer."""
-
-    status: DistributionStatus
-    is_optimal: bool
-    size: float = 0.0  # of the residual, over the scale
-    distance: float | None = None  # the same, by Clarabel
-    cost_error: float | None = None
-
-    @property
-    def cost_tolerance(self) -> float:
-        return COST + (ACHIEVED / self.size if self.status == RELAXED else 0.0)
-
-    @property
-    def wrong(self) -> str:
-        if self.status not in (SOLVED, RELAXED):
-            return str(self.status)
-        if not self.is_optimal:
-            return "isOptimal() is false"
-        if self.distance is not None:
-            solved = self.status == SOLVED
-            if (solved and self.distance > REACH[1]) or (not solved and self.distance < REACH[0]):
-                return f"{self.status}, but the distance is {self.distance:.1e}"
-            if not abs(self.size - self.distance) <= DISTANCE:
-                return f"the distance is {self.size:.1e}, not {self.distance:.1e}"
-        if self.cost_error is not None and not abs(self.cost_error) <= self.cost_tolerance:
-            return f"the cost is off by {self.cost_error:.1e}"
-        return ""
-
-
-def compare(problem: Problem) -> Comparison:
-    solution = solve(problem)
-    unit = unit_of(problem)
-    scale = unit * problem.wrench_weights.max()
-    comparison = Comparison(
-        solution.status,
-        solution.isOptimal(problem.make()),
-        size_of(problem, solution.residual) / scale,
-    )
-    if solution.status not in (SOLVED, RELAXED):
-        return comparison
-    distance = least_distance(problem, unit)
-    if distance is not None:
-        comparison.distance = distance * unit / scale
-    cost = least_cost(problem, solution, unit)
-    if cost is not None:
-        comparison.cost_error = (solution.cost - cost * unit**2) / cost_scale(problem, solution)
-    return comparison
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_clarabel_agrees(kind):
-    """In both stages: how close the closest wrench is, and what its cheapest forces cost."""
-    comparisons = [compare(make_problem(kind, number)) for number in range(300)]
-    wrong = {number: c.wrong for number, c in enumerate(comparisons) if c.wrong}
-    assert not wrong
-    for status in (SOLVED, RELAXED):
-        assert sum(c.status == status for c in comparisons) > 100
-    assert sum(c.distance is None for c in comparisons) < 30
-    assert sum(c.cost_error is None for c in comparisons) < 10
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -544,7 +544,7 @@ def test_own_file(robot_file, name):
     path = robot_file(
         with_contacts(
             POINT | {"weights": [1, 2, 3], "world_aligned": True, "radius": 0.02},
-            SOLE | {"weights": [1, 2, 3, 4, 5, 6]},
+            SOLE | {"weights": [1, 2, 3, 4, 5, 6], "coupled_yaw": True},
         ),
         name,
     )
@@ -564,6 +564,7 @@ def test_own_file(robot_file, name):
         0.3,
     )
     sole.weights = np.arange(1.0, 7.0)
+    sole.coupled_yaw = True
     assert robot.contacts["sole"] == sole
     assert robot.dynacom().getMass() == 2.0
     # The same as text, and the default weights.
