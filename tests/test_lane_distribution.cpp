@@ -285,8 +285,10 @@ void checkCones(const Stand& stand, Tally& tally) {
         if (!is_answered) continue;
         const SetVerdict verdict = dynacom_tests::check(sets, actual);
         BOOST_TEST(verdict.outside < 1e-9);
-        BOOST_TEST(verdict.distance_gap < 1e-8);
-        if (dynacom_tests::check(sets, expected).error != "") continue;
+        const bool is_expected = dynacom_tests::check(sets, expected).error == "";
+        // Those that lanes leave to the DistributionSolver are its own.
+        if (differs || is_expected) BOOST_TEST(verdict.distance_gap < 1e-8);
+        if (!is_expected) continue;
         BOOST_TEST(actual.status == expected.status);
         BOOST_TEST(close(actual.residual / unit, expected.residual / unit, 1e-9));
         BOOST_TEST(std::abs(cost - expected.cost) <= 1e-6 * expected.cost);
