@@ -78,13 +78,6 @@ std::vector<Eigen::Matrix3Xd> placePoints(const std::vector<std::vector<pinocchi
   return places;
 }
 
-// F of a link, by the model of the parts.
-Section findLinkFriction(const std::vector<FixedContact>& parts) {
-  const double mu = findBodyFriction(parts);
-  if (parts.empty()) return Section::disc(mu);
-  return dynamic_cast<const ContactPoint&>(*parts.front().contact).getSettings().makeFriction(mu);
-}
-
 }  // namespace
 
 std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion& motion,
@@ -96,7 +89,9 @@ std::vector<Seat> findSeats(const std::vector<BodyPoints>& bodies, const Motion&
   if (!(weight > 0.)) return seats;
   const std::vector<FixedContact>& points = question.parts.carrier.contacts;
   const std::vector<Section> of_parts = listFriction(question.parts);
-  const Section of_links = findLinkFriction(points);
+  SurfaceOptions of_link;
+  of_link.friction = settings.friction;
+  const Section of_links = of_link.makeFriction(findBodyFriction(points));
 
   for (const Run& run : runs) {
     std::vector<Index> frames;

@@ -594,7 +594,10 @@ void WrenchDistribution::Workspace::rearrange() {
 bool WrenchDistribution::Workspace::distribute(double minimal_scale) {
   keepForces();
   bool answered = knows_all_sets && distributeBySets(minimal_scale);
-  if (has_sets) return answered;
+  if (has_sets) {
+    result.iterations = std::min(result.iterations, maximal_iterations);
+    return answered;
+  }
   const int in_vain = knows_all_sets ? sets.solution().iterations_in_vain : 0;
   result.iterations -= in_vain;
   if (!answered || !isCertain(sets.solution())) {
@@ -849,7 +852,8 @@ double WrenchDistribution::Workspace::findBoundary(const Vector6& wrench, const 
 // infinite where all that was looked at is reachable. Negative if it fails.
 double WrenchDistribution::Workspace::findBoundaryOfSets(const Vector6& direction, double bound) {
   constexpr double kFarthest = 1e6;  // of the scale
-  double s = std::isfinite(bound) ? bound : kFarthest * result.scale;
+  const double scale = result.scale > 0. ? result.scale : 1.;
+  double s = std::isfinite(bound) ? bound : kFarthest * scale;
   const Vector6 start = result.achieved;
   for (int step = 0; step < kMarginSteps && s > 0.; ++step) {
     problem.wrench = start + s * direction;
@@ -862,7 +866,7 @@ double WrenchDistribution::Workspace::findBoundaryOfSets(const Vector6& directio
     const double cut =
         std::max(0., outward.dot(solution.achieved - start) / outward.dot(direction));
     if (!(cut < s * (1. - kMarginChange))) break;
-    s = cut > kMarginChange * result.scale ? cut : 0.;
+    s = cut > kMarginChange * scale ? cut : 0.;
   }
   return s;
 }

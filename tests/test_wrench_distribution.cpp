@@ -2762,6 +2762,7 @@ BOOST_AUTO_TEST_CASE(what_is_proved_is_an_answer_though_there_was_no_time_for_mo
         for (const auto& contact : right.contacts) problem.contacts.push_back(describeBox(contact));
         problem.wrench = total;
         DistributionSolver first;
+        first.setMaximalIterations(cap);
         BOOST_TEST(first.solve(problem).iterations + solver.iterations() > cap);
         continue;
       }

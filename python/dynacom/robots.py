@@ -390,6 +390,8 @@ def _numbers(count: int) -> Callable[[Any], np.ndarray]:
 def _whole_number(value: Any) -> int:
     if not is_number(value) or value != int(value):
         raise ValueError("a whole number")
+    if abs(value) >= 2**31:
+        raise ValueError("a whole number of 32 bits")
     return int(value)
 
 

@@ -100,6 +100,13 @@ void addPair(const Columns& columns, const Matrix2d& J, Sum&& sum) {
   if (J(1, 1) != 0.) sum.noalias() += J(1, 1) * b * b.transpose();
 }
 
+template <class Element>
+struct Range {
+  Element *first, *last;
+  Element* begin() const { return first; }
+  Element* end() const { return last; }
+};
+
 // A contact in units of its cost, x = W λ.
 struct Block {
   int size = 3;
@@ -315,7 +322,9 @@ struct DistributionSolver::Workspace {
   int maximal_iterations = kMaximalIterations;
   bool warm_start = true;
   DistributionSolution solution;
+  // Of the contacts, and of more that there were before: what these have allocated stays.
   std::vector<Block> blocks;
+  std::size_t block_count = 0;
   Vector6 weights;  // D over its overall size
   Vector6 target, residual;
   double largest_weight = 0.;  // of the cost, of all contacts
@@ -354,6 +363,8 @@ struct DistributionSolver::Workspace {
   bool startFree();
   double enough() const { return std::max(may_lack, Tolerances::rounding * terms); }
   Vector6 missing() const { return target - achieved; }
+  Range<Block> placed() { return {blocks.data(), blocks.data() + block_count}; }
+  Range<const Block> placed() const { return {blocks.data(), blocks.data() + block_count}; }
   DistributionStatus search();
   DistributionStatus approach(double slack, Vector6 centre, Effort effort, int rounds);
   bool isReachedWithoutSlack();
@@ -371,33 +382,35 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
                                          double overall_weight) {
   weights = problem.wrench_weights / overall_weight;
   target = weights.cwiseProduct(problem.wrench) / unit;
-  blocks.resize(problem.contacts.size());
-  directions.reserve(6 * blocks.size());
+  block_count = problem.contacts.size();
+  if (blocks.size() < block_count) blocks.resize(block_count);
+  directions.reserve(6 * block_count);
   largest_weight = 0.;
   for (const auto& contact : problem.contacts)
     largest_weight =
         std::max(largest_weight, contact.weights.size() > 0 ? contact.weights.maxCoeff() : 1.);
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
+  for (std::size_t k = 0; k < block_count; ++k) {
     const DistributionProblem::Contact& contact = problem.contacts[k];
     Block& block = blocks[k];
     const Index n = contact.set.size();
     block.size = int(n);
-    if (!block.is_described || block.described_largest != largest_weight ||
-        block.described_weights.size() != contact.weights.size() ||
-        block.described_weights != contact.weights || block.described != contact.set) {
-      block.described = contact.set;
-      block.described_weights = contact.weights;
-      block.described_largest = largest_weight;
+    const bool is_known =
+        block.is_described && block.described_weights.size() == contact.weights.size() &&
+        block.described_weights == contact.weights && block.described == contact.set;
+    if (!is_known || block.described_largest != largest_weight) {
       block.weights.setOnes();
       if (contact.weights.size() > 0) block.weights.head(n) = contact.weights;
       block.weights.head(n) /= largest_weight;
       block.inverse_weights = block.weights.cwiseInverse();
-      block.set = block.face = ScaledSet(contact.set, block.weights);
-      block.set.setUnit(contact.set, block.weights, unit);
-      block.is_described = true;
-    } else if (!contact.set.isCone()) {
-      block.set.setUnit(contact.set, block.weights, unit);
+      block.described_largest = largest_weight;
     }
+    if (!is_known) {
+      block.set = block.face = ScaledSet(contact.set, block.weights);
+      block.described = contact.set;
+      block.described_weights = contact.weights;
+      block.is_described = true;
+    }
+    if (!is_known || !contact.set.isCone()) block.set.setUnit(contact.set, block.weights, unit);
     block.place(contact, weights);
     block.has_reference = contact.reference.size() > 0;
     block.reference.setZero();
@@ -408,7 +421,7 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
 
 double DistributionSolver::Workspace::findMeanCompliance() const {
   double sum = 0.;
-  for (const Block& block : blocks) sum += block.e.leftCols(block.size).squaredNorm() / 6.;
+  for (const Block& block : placed()) sum += block.e.leftCols(block.size).squaredNorm() / 6.;
   return sum;
 }
 
@@ -417,7 +430,7 @@ void DistributionSolver::Workspace::evaluate(const Vector6& nu, Which which) {
   multipliers = nu;
   achieved.setZero();
   terms = value = 0.;
-  for (Block& block : blocks) {
+  for (Block& block : placed()) {
     block.pull = block.pullOf(nu);
     if (block.has_reference) block.pull += block.reference;
     (block.*which).project(block.pull, block.response);
@@ -434,7 +447,7 @@ void DistributionSolver::Workspace::evaluate(const Vector6& nu, Which which) {
 // @param outside  what to add to that, where faces give no wrenches; or null
 void DistributionSolver::Workspace::factorise(double slack, const Matrix6* outside) {
   Matrix6 compliance = Matrix6::Zero();
-  for (const Block& block : blocks) block.addCompliance(compliance);
+  for (const Block& block : placed()) block.addCompliance(compliance);
   if (outside) compliance += *outside;
   compliance.diagonal().array() += slack;
   factors.compute(compliance);
@@ -496,7 +509,7 @@ bool DistributionSolver::Workspace::startFree() {
   ++iterations;
   Matrix6 compliance = Matrix6::Zero();
   Vector6 rest = target;
-  for (const Block& block : blocks) {
+  for (const Block& block : placed()) {
     block.addFreeCompliance(compliance);
     if (block.has_reference) rest -= block.wrenchOf(block.reference);
   }
@@ -586,7 +599,7 @@ bool DistributionSolver::Workspace::spanFaces(Effort effort, Matrix6& basis, int
                                               Vector6& fixed) {
   directions.clear();
   fixed.setZero();
-  for (const Block& block : blocks) {
+  for (const Block& block : placed()) {
     const ScaledSet::Span span = block.face.span();
     fixed += block.wrenchOf(span.fixed);
     for (int k = 0; k < span.count; ++k)
@@ -608,7 +621,7 @@ bool DistributionSolver::Workspace::findResidual(Effort effort, Matrix6& outside
   for (int step = 0; step < Tolerances::steps && !is_found; ++step) {
     Matrix6 bend = Matrix6::Zero();
     bool is_bent = false;
-    for (Block& block : blocks) {
+    for (Block& block : placed()) {
       ScaledSet::Bend own;
       block.set.hold(block.response, block.pullOf(residual), block.face, own);
       if (own.friction.isZero(0.) && own.moments.isZero(0.)) continue;
@@ -643,7 +656,7 @@ bool DistributionSolver::Workspace::findResidual(Effort effort, Matrix6& outside
   }
   const double size = residual.norm();
   if (!is_found || !(size > Tolerances::reach) || !std::isfinite(size)) return false;
-  for (Block& block : blocks)
+  for (Block& block : placed())
     if (!block.set.expose(block.pullOf(residual),
                           (Tolerances::exposed * size + Tolerances::rounding) * block.reach(),
                           block.face))
@@ -720,7 +733,7 @@ bool DistributionSolver::Workspace::reachClosest(Effort effort, const Vector6& s
   const double size = residual.norm();
   // No reachable wrench is closer: forces are as far in the direction of the residual as any.
   double gap = 0.;
-  for (const Block& block : blocks) {
+  for (const Block& block : placed()) {
     const Vector6 pull = block.pullOf(residual);
     gap += std::max(0., block.set.support(pull, Tolerances::exposed * size * block.reach()) -
                             pull.dot(block.response.force));
@@ -739,7 +752,8 @@ bool DistributionSolver::Workspace::exposesClearly() {
     block.set.expose(block.pullOf(residual), tolerance * size * block.reach(), face);
     return face.span().count;
   };
-  return std::all_of(blocks.begin(), blocks.end(), [&](const Block& block) {
+  const auto all = placed();
+  return std::all_of(all.begin(), all.end(), [&](const Block& block) {
     return countAxes(block, Tolerances::missing) == countAxes(block, Tolerances::reach);
   });
 }
@@ -836,8 +850,9 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   solution.cost = cost * std::pow(unit * largest, 2);
   // What of the wrench is rounding has a price, by the multipliers.
   solution.is_accurate =
-      work.is_accurate &&
-      work.multipliers.norm() * Tolerances::rounding * work.terms <= Tolerances::reach * sizes;
+      answered ? work.is_accurate && work.multipliers.norm() * Tolerances::rounding * work.terms <=
+                                         Tolerances::reach * sizes
+               : solution.status == DistributionStatus::Solved;
   // That of the closest wrench is known with more digits than the difference has.
   solution.residual = solution.status == DistributionStatus::Relaxed
                           ? Vector6(unit * work.residual.cwiseQuotient(work.weights))
