@@ -313,16 +313,19 @@ typename TwoStageSolver<Scalar>::Vector6 TwoStageSolver<Scalar>::giveScaled(
   return wrench.cwiseProduct(slackened_.norms);
 }
 
+// What multipliers of relax() have to be more than, not to be rounding.
+template <class Scalar>
+Scalar TwoStageSolver<Scalar>::findLeastMultiplier() const {
+  return std::max(Scalar(kMultiplied) * distance_.norm(), Tolerances<Scalar>::kMultiplierRounding);
+}
+
 // Where relax() has multiplied an inequality, all forces that come as close to the wrench hold it
 // as an equation. Each touches one contact alone: in a basis of that contact's coordinates which
 // begins with their normals, the cheapest forces have zeros there, and the rest are their
 // variables.
 template <class Scalar>
 void TwoStageSolver<Scalar>::restrictToFace() {
-  const Scalar least =
-      std::max(Scalar(kMultiplied) * distance_.norm(), Tolerances<Scalar>::kMultiplierRounding);
-  relaxation_multipliers_ =
-      (relaxation_multipliers_.array() > least).select(relaxation_multipliers_, Scalar(0));
+  const Scalar least = findLeastMultiplier();
   face_.setZero(n_, n_);
   R_.setZero(n_, n_);
   Eigen::Index col = 0, row = 0;
@@ -348,7 +351,7 @@ void TwoStageSolver<Scalar>::restrictToFace() {
     };
 
     for (Eigen::Index j = row; j < row + rows && size < cols; ++j) {
-      if (!(relaxation_multipliers_[j] > Scalar(0))) continue;
+      if (!(relaxation_multipliers_[j] > least)) continue;
       const auto normal = slackened_.G.col(j).segment(6 + col, cols);
       if (!append(normal, Tolerances<Scalar>::kDependent * normal.norm())) continue;
       held_[col + size - 1] = j;
@@ -490,6 +493,13 @@ void TwoStageSolver<Scalar>::writeAnswer(DistributionResult& result, double unit
     answer.relaxation_multipliers =
         (distance_scale * relaxation_multipliers_.segment(row, rows)).template cast<double>();
     answer.active = active_.segment(row, rows);
+    // Of an inequality that does not hold as an equation, what is no more is rounding.
+    const double rounding = double(distance_scale * findLeastMultiplier());
+    for (Eigen::Index j = 0; j < rows; ++j) {
+      double& multiplier = answer.relaxation_multipliers[j];
+      const double slack = -answer.A.row(j).dot(answer.force);
+      if (multiplier <= rounding && slack > kReach * unit) multiplier = 0.;
+    }
     col += cols;
     row += rows;
   }

@@ -98,6 +98,7 @@ class TwoStageSolver {
   bool minimizeCostOnFace(const Vector6& wrench, Scalar tolerance);
   void extrapolate();
   Vector6 giveScaled(const KeptVector& forces) const;
+  Scalar findLeastMultiplier() const;
   void restrictToFace();
   bool passesCheck(const Vector6& wrench, Scalar reach, Scalar inequality) const;
   Vector6 give(const KeptVector& forces) const;

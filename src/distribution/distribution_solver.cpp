@@ -362,6 +362,9 @@ struct DistributionSolver::Workspace {
   double findMeanCompliance() const;
   bool startFree();
   double enough() const { return std::max(may_lack, Tolerances::rounding * terms); }
+  // Whether no step makes what is missing smaller: less than some ten errors of what it is a sum
+  // of.
+  bool isRounding(double size) const { return size <= 10. * Tolerances::rounding * terms; }
   Vector6 missing() const { return target - achieved; }
   Range<Block> placed() { return {blocks.data(), blocks.data() + block_count}; }
   Range<const Block> placed() const { return {blocks.data(), blocks.data() + block_count}; }
@@ -485,7 +488,7 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
       if (is_local) {
         if (residual.norm() < size) break;
         evaluate(start, which);
-        return size <= Tolerances::missing;  // that is rounding
+        return isRounding(size);
       }
       const double end_slope = residual.dot(direction);
       const bool descends = end_slope <= 0.;
@@ -674,7 +677,6 @@ bool DistributionSolver::Workspace::reachOnFaces(Effort effort, const Matrix6& o
   const Matrix6 stiff = compliance * outside;
   evaluate(start, face);
   bool given = descend(face, 0., start, Tolerances::direct_steps, &stiff);
-  is_accurate = given;
   if (!given && effort != Effort::Little) {
     Vector6 centre = start;
     evaluate(start, face);
@@ -693,9 +695,9 @@ bool DistributionSolver::Workspace::reachOnFaces(Effort effort, const Matrix6& o
     // Multipliers of what faces do not give mean nothing.
     evaluate(multipliers - outside * multipliers, face);
     const double may_be_left = effort == Effort::All ? Tolerances::exposed : Tolerances::missing;
-    is_accurate = missing().norm() <= enough();
     given = missing().norm() <= std::max(may_be_left, enough());
   }
+  is_accurate = isRounding(missing().norm());
   may_lack = Tolerances::missing;
   return given;
 }
