@@ -408,7 +408,10 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
       block.described_largest = largest_weight;
     }
     if (!is_known) {
-      block.set = block.face = ScaledSet(contact.set, block.weights);
+      // By the contact's own weights: what others weigh does not change a bit of it.
+      Vector6 own = Vector6::Ones();
+      if (contact.weights.size() > 0) own.head(n) = contact.weights;
+      block.set = block.face = ScaledSet(contact.set, own);
       block.described = contact.set;
       block.described_weights = contact.weights;
       block.is_described = true;
