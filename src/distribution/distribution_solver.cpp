@@ -342,6 +342,7 @@ struct DistributionSolver::Workspace {
   double value = 0.;  // of the dual, without slack
   Factors6 factors;
   int iterations = 0, iterations_in_vain = 0;
+  bool is_cut = false;  // whether there were not enough
   bool is_accurate = false;
   bool is_found_at_once = false;  // by the first step of all: nothing else leads there faster
 
@@ -470,7 +471,11 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
     // What no step makes smaller, and is small, is rounding.
     if (size <= enough() || (size <= Tolerances::missing && size > 0.5 * former)) return true;
     former = size;
-    if (step == steps || iterations >= maximal_iterations) return false;
+    if (step == steps) return false;
+    if (iterations >= maximal_iterations) {
+      is_cut = true;
+      return false;
+    }
     ++iterations;
     factorise(slack, outside);
     if (slack == 0. && !hasFullRank()) return false;
@@ -543,6 +548,7 @@ DistributionStatus DistributionSolver::Workspace::search() {
       if (status != DistributionStatus::NumericalFailure && is_accurate) return status;
     }
     iterations_in_vain = std::exchange(iterations, 0);
+    is_cut = false;
     is_accurate = true;
   }
   if (startFree() && descend(&Block::set, 0., multipliers, Tolerances::direct_steps)) {
@@ -552,7 +558,8 @@ DistributionStatus DistributionSolver::Workspace::search() {
   if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
   const DistributionStatus status = approach(Tolerances::first_slack * findMeanCompliance(),
                                              Vector6::Zero(), Effort::Usual, Tolerances::rounds);
-  return status == DistributionStatus::NumericalFailure && missing().norm() <= Tolerances::reach
+  return status == DistributionStatus::NumericalFailure && !is_cut &&
+                 missing().norm() <= Tolerances::reach
              ? DistributionStatus::Solved
              : status;
 }
@@ -570,6 +577,7 @@ DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6
     const Vector6 lacking = missing();
     const double size = lacking.norm();
     if (size <= Tolerances::reach && isReachedWithoutSlack()) return DistributionStatus::Solved;
+    if (is_cut) break;
     if (size <= enough()) return DistributionStatus::Solved;
     // What stays is out of reach, if it proves so.
     const bool stays = (lacking - former_missing).norm() <= 0.1 * size;
@@ -807,7 +815,7 @@ const DistributionSolution& DistributionSolver::solve(const DistributionProblem&
   const double unit = scale / overall_weight;
   work.iterations = work.iterations_in_vain = 0;
   work.is_accurate = true;
-  work.is_found_at_once = false;
+  work.is_cut = work.is_found_at_once = false;
   if (!problem.wrench.allFinite()) {
     solution.status = DistributionStatus::InvalidInput;
   } else if (contacts == 0) {

@@ -103,7 +103,10 @@ def test_clarabel_agrees(kind):
     """In both stages: how close the closest wrench is, and what its cheapest forces cost."""
     comparisons = [compare(make_problem(kind, number)) for number in range(300)]
     wrong = {number: c.wrong for number, c in enumerate(comparisons) if c.wrong}
-    assert not wrong
+    # What is not certified says so, and is no more than the half percent in docs/algorithm.md.
+    silent = [n for n in wrong if comparisons[n].is_optimal or comparisons[n].is_accurate]
+    assert not silent, wrong
+    assert len(wrong) <= 0.005 * len(comparisons), wrong
     for status in (SOLVED, RELAXED):
         assert sum(c.status == status for c in comparisons) > 100
     assert sum(c.distance is None for c in comparisons) < 10
