@@ -56,6 +56,9 @@ struct Tolerances {
   // faces.
   static constexpr double first_slack = 1e-4, least_slack = 1e-14, slack_factor = 0.05, fall = 0.2;
   static constexpr int rounds = 40, slow_rounds = 4;
+  // By which part of what is missing a round may still change that, to be an answer where no proof
+  // is found.
+  static constexpr double settled = 1e-3;
 
   // Of a direction that faces span, what remains outside of the others: more than the first, it is
   // one of its own, less than the second, it is rounding.
@@ -571,7 +574,8 @@ DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6
   is_accurate = false;
   const double least_slack = Tolerances::least_slack * findMeanCompliance();
   double former = 0.;
-  Vector6 former_missing = Vector6::Zero();
+  Vector6 former_missing = Vector6::Zero(), settled = Vector6::Zero();
+  bool is_settled = false;
   for (int round = 0; round < rounds && iterations < maximal_iterations; ++round) {
     descend(&Block::set, slack, centre, Tolerances::steps);
     const Vector6 lacking = missing();
@@ -589,13 +593,22 @@ DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6
       if (slack <= least_slack && relax(multipliers, Effort::All))
         return DistributionStatus::Relaxed;
     }
+    if (!is_settled && (lacking - former_missing).norm() <= Tolerances::settled * size) {
+      is_settled = true;
+      settled = multipliers;
+    }
     former_missing = lacking;
     if (size > Tolerances::fall * former)
       slack = std::max(slack * Tolerances::slack_factor, least_slack);
     former = size;
     centre = multipliers;
   }
-  return DistributionStatus::NumericalFailure;
+  if (is_cut || !is_settled) return DistributionStatus::NumericalFailure;
+  // Without a proof: where discs hardly span a direction, no smaller slack has more digits.
+  evaluate(settled, &Block::set);
+  residual = missing();
+  return residual.norm() > Tolerances::reach ? DistributionStatus::Relaxed
+                                             : DistributionStatus::Solved;
 }
 
 // Next to the answer, Newton's method without slack has all digits. Returns whether it is there, or
