@@ -56,9 +56,9 @@ struct Tolerances {
   // faces.
   static constexpr double first_slack = 1e-4, least_slack = 1e-14, slack_factor = 0.05, fall = 0.2;
   static constexpr int rounds = 40, slow_rounds = 4;
-  // By which part of what is missing a round may still change that, to be an answer where no proof
-  // is found.
-  static constexpr double settled = 1e-3;
+  // By which part of what is missing a round may still change that, and how much closer a wrench
+  // may be, for an answer where no proof is found: less than that no motion or robot is known by.
+  static constexpr double settled = 1e-3, near = 1e-5;
 
   // Of a direction that faces span, what remains outside of the others: more than the first, it is
   // one of its own, less than the second, it is rounding.
@@ -379,6 +379,7 @@ struct DistributionSolver::Workspace {
   bool spanFaces(Effort effort, Matrix6& basis, int& rank, Vector6& fixed);
   bool findResidual(Effort effort, Matrix6& outside);
   bool reachClosest(Effort effort, const Vector6& start, const Matrix6& outside);
+  double findGap(double rounding) const;
   bool exposesClearly();
   bool reachOnFaces(Effort effort, const Matrix6& outside);
   std::vector<Vector6> directions;
@@ -575,7 +576,7 @@ DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6
   const double least_slack = Tolerances::least_slack * findMeanCompliance();
   double former = 0.;
   Vector6 former_missing = Vector6::Zero(), settled = Vector6::Zero();
-  bool is_settled = false;
+  double least_change = Tolerances::settled;
   for (int round = 0; round < rounds && iterations < maximal_iterations; ++round) {
     descend(&Block::set, slack, centre, Tolerances::steps);
     const Vector6 lacking = missing();
@@ -593,8 +594,9 @@ DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6
       if (slack <= least_slack && relax(multipliers, Effort::All))
         return DistributionStatus::Relaxed;
     }
-    if (!is_settled && (lacking - former_missing).norm() <= Tolerances::settled * size) {
-      is_settled = true;
+    const double change = (lacking - former_missing).norm() / size;
+    if (change <= least_change) {
+      least_change = change;
       settled = multipliers;
     }
     former_missing = lacking;
@@ -603,12 +605,15 @@ DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6
     former = size;
     centre = multipliers;
   }
-  if (is_cut || !is_settled) return DistributionStatus::NumericalFailure;
+  if (is_cut || settled.isZero(0.) || !(missing().norm() > Tolerances::reach))
+    return DistributionStatus::NumericalFailure;
   // Without a proof: where discs hardly span a direction, no smaller slack has more digits.
   evaluate(settled, &Block::set);
   residual = missing();
-  return residual.norm() > Tolerances::reach ? DistributionStatus::Relaxed
-                                             : DistributionStatus::Solved;
+  const double size = residual.norm();
+  if (findGap(Tolerances::settled) <= Tolerances::near * size) return DistributionStatus::Relaxed;
+  residual.setZero();
+  return DistributionStatus::NumericalFailure;
 }
 
 // Next to the answer, Newton's method without slack has all digits. Returns whether it is there, or
@@ -757,17 +762,24 @@ bool DistributionSolver::Workspace::reachClosest(Effort effort, const Vector6& s
   if (!given) return false;
   if (effort == Effort::All) residual = missing();
   const double size = residual.norm();
-  // No reachable wrench is closer: forces are as far in the direction of the residual as any.
-  double gap = 0.;
-  for (const Block& block : placed()) {
-    const Vector6 pull = block.pullOf(residual);
-    gap += std::max(0., block.set.support(pull, Tolerances::exposed * size * block.reach()) -
-                            pull.dot(block.response.force));
-  }
   is_accurate = is_accurate && effort != Effort::All &&
                 size >= Tolerances::far * weights.maxCoeff() / weights.minCoeff() &&
                 exposesClearly();
-  return gap <= Tolerances::reach * size;
+  return findGap(Tolerances::exposed) <= Tolerances::reach * size;
+}
+
+// By how much forces could be farther in the direction of the residual: by nothing where no
+// reachable wrench is closer.
+// @param rounding  what part of the residual may be that
+double DistributionSolver::Workspace::findGap(double rounding) const {
+  const double size = residual.norm();
+  double gap = 0.;
+  for (const Block& block : placed()) {
+    const Vector6 pull = block.pullOf(residual);
+    gap += std::max(0., block.set.support(pull, rounding * size * block.reach()) -
+                            pull.dot(block.response.force));
+  }
+  return gap;
 }
 
 // Whether the residual exposes the same faces, whatever of it is taken for rounding.
