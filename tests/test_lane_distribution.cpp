@@ -467,6 +467,7 @@ BOOST_AUTO_TEST_CASE(contacts_of_each_kind_with_cones_are_shared_in_lanes) {
       }
       if (tally.solved + tally.relaxed == 0) return;  // a machine without lanes
       BOOST_TEST(tally.relaxed > 20);
+      BOOST_TEST(tally.uncertified < 0.005 * (tally.solved + tally.relaxed));
       // A point alone gives most by its normal force, which may round alike.
       BOOST_TEST(tally.in_lanes > (name == "a point" ? 0.5 : 0.95) * tally.bound);
     }
@@ -479,6 +480,7 @@ BOOST_AUTO_TEST_CASE(cones_with_unequal_weights_are_left_to_one_frame_at_a_time)
   Tally tally;
   checkCones(Stand(problem, makeWrenches(problem.wrench, random, 21), random, true), tally);
   BOOST_TEST(tally.failed == 0);
+  BOOST_TEST(tally.uncertified == 0);
 }
 
 BOOST_AUTO_TEST_CASE(a_foot_that_is_all_but_level_tips_over_its_side_in_lanes) {
