@@ -85,6 +85,11 @@ Solution solve(DistributionSolver& self, const Problem& problem) {
   return self.solve(problem);
 }
 
+Solution solveMoved(DistributionSolver& self, const Problem& problem) {
+  problem.validate();
+  return self.solveMoved(problem);
+}
+
 bp::list getForces(const Solution& self) {
   return toList(std::vector<Eigen::VectorXd>(self.forces.begin(), self.forces.end()));
 }
@@ -216,6 +221,11 @@ void exposeDistributionSolver() {
           "Whether the answer has all digits that doubles have: not where only the\n"
           "proximal point method has led to it, and, of Relaxed ones, next to the boundary\n"
           "and where rounding decides what the residual exposes.")
+      .def_readonly(
+          "is_clear", &Solution::is_clear,
+          "Whether it has all digits but for how close the boundary is, too: its faces are\n"
+          "known for sure, and the forces on them, but of the residual not more digits than\n"
+          "it is large.")
       .def("isOptimal", &Solution::isOptimal,
            (bp::arg("self"), bp::arg("problem"), bp::arg("tolerance") = 1e-6),
            "Whether this is the answer to a problem, judged by nothing but both: forces in their\n"
@@ -240,6 +250,12 @@ void exposeDistributionSolver() {
            "if it was for as many contacts.")
       .def("solve", &solve, (bp::arg("self"), bp::arg("problem")),
            "The DistributionSolution of a problem, a copy. ValueError as of its validate().")
+      .def(
+          "solveMoved", &solveMoved, (bp::arg("self"), bp::arg("problem")),
+          "The same for a problem that differs from that of the last solve() in rotations, "
+          "levers,\n"
+          "the wrench, its weights and minimal_scale alone: nothing else of contacts is looked at\n"
+          "again. ValueError as of its validate(), or if the contacts are more or fewer.")
       .def(PrintVisitor<DistributionSolver>(&writeSolver))
       .def(CopyVisitor<DistributionSolver>());
 }

@@ -30,7 +30,9 @@ void ContactBase::updateNewtonEuler(const Eigen::Vector3d& com, const SE3& oMs) 
   // which a point has the three columns of the force.
   Eigen::Map<Eigen::Matrix<double, 6, 3>> of_force(ne_A_.data());
   of_force.topRows<3>() = R;
-  for (int axis = 0; axis < 3; ++axis) of_force.col(axis).tail<3>() = lever.cross(R.col(axis));
+  of_force.row(3) = lever.y() * R.row(2) - lever.z() * R.row(1);
+  of_force.row(4) = lever.z() * R.row(0) - lever.x() * R.row(2);
+  of_force.row(5) = lever.x() * R.row(1) - lever.y() * R.row(0);
   if (cols() == 6) ne_A_.bottomRightCorner<3, 3>() = R;
 }
 

@@ -5,6 +5,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "pair.hpp"
+
 namespace dynacom::internal {
 
 // Calls a function with 0, 1, ... 5, which the compiler knows.
@@ -16,6 +18,35 @@ template <class Function>
 inline void unroll6(Function function) {
   unroll(function, std::make_integer_sequence<int, 6>());
 }
+
+/// The lower half of a sum Σ a aᵀ: as pairs of rows, which all fit in registers, and of which some
+/// have one from the upper half.
+class SumOfSquares6 {
+ public:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+  /// Adds a aᵀ of a vector whose components before `first`, 0 or 3, are zero.
+  template <int first = 0>
+  void add(const Vector6& a) {
+    const Pair rows[3] = {loadPair(&a[0]), loadPair(&a[2]), loadPair(&a[4])};
+    unroll6([&](auto column) {
+      constexpr int j = column;
+      if constexpr (j >= first)
+        for (int pair = j / 2; pair < 3; ++pair) pairs_[3 * j + pair] += a[j] * rows[pair];
+    });
+  }
+
+  /// The sum, and zeros above it, but for what is in pairs.
+  Matrix6 toMatrix() const {
+    Matrix6 matrix;
+    for (int k = 0; k < 18; ++k) storePair(pairs_[k], matrix.data() + 2 * k);
+    return matrix;
+  }
+
+ private:
+  Pair pairs_[18] = {};  // column by column
+};
 
 /// L D Lᵀ of a symmetric positive matrix, of which the lower half is read. Without square roots,
 /// and with sizes that the compiler knows, it takes half the time of Eigen's Cholesky

@@ -275,6 +275,9 @@ struct WrenchDistribution::Workspace {
 
   bool has_sets = false;        // whether some contacts of the result are more than pyramids
   bool knows_all_sets = false;  // whether none of them is described by matrices alone
+  bool are_sets_new = false;    // whether `sets` has not seen them
+  // Whether inequalities of the result may be active or have multipliers.
+  bool has_multipliers = true;
   DistributionProblem problem;  // these, where their sets are known
   DistributionSolver sets;
   TwoStageSolver<double> solver;                // for others, and for pyramids what that leaves
@@ -294,8 +297,9 @@ struct WrenchDistribution::Workspace {
   void takeSets();
   void keepForces();
   bool distribute(double minimal_scale);
-  bool distributeBySets(double minimal_scale);
-  void writeMultipliers(const DistributionSolution& solution);
+  bool solveSets(double minimal_scale);
+  void writeAnswerOfSets();
+  bool writeMultipliers(const DistributionSolution& solution);
   bool isCertain(const DistributionSolution& solution) const;
   bool distributeRobustly();
   template <class Scalar>
@@ -559,7 +563,7 @@ void WrenchDistribution::Workspace::takeProblem() {
 // Of contacts that are others than before.
 void WrenchDistribution::Workspace::takeSets() {
   has_answer = has_sets = false;
-  knows_all_sets = true;
+  knows_all_sets = are_sets_new = has_multipliers = true;
   for (const std::size_t number : solved) {
     has_sets = has_sets || !slots[number].is_pyramid;
     knows_all_sets = knows_all_sets && slots[number].set;
@@ -592,23 +596,25 @@ void WrenchDistribution::Workspace::rearrange() {
 // Returns false if there is no answer. What an attempt from the last one has taken in vain comes on
 // top of the iterations that are allowed, and is counted where they leave room for it.
 bool WrenchDistribution::Workspace::distribute(double minimal_scale) {
-  keepForces();
-  bool answered = knows_all_sets && distributeBySets(minimal_scale);
-  if (has_sets) {
-    result.iterations = std::min(result.iterations, maximal_iterations);
-    return answered;
-  }
+  bool answered = knows_all_sets && solveSets(minimal_scale);
   const int in_vain = knows_all_sets ? sets.solution().iterations_in_vain : 0;
-  result.iterations -= in_vain;
-  if (!answered || !isCertain(sets.solution())) {
-    if (hasFiniteMatrices()) {
-      answered = distributeRobustly();
-    } else {
-      result.status = DistributionStatus::InvalidInput;
-      answered = false;
+  if (has_sets || (answered && sets.solution().is_accurate)) {
+    if (answered) writeAnswerOfSets();
+  } else {
+    keepForces();
+    if (answered) writeAnswerOfSets();
+    result.iterations -= in_vain;
+    if (!answered || !isCertain(sets.solution())) {
+      if (hasFiniteMatrices()) {
+        answered = distributeRobustly();
+      } else {
+        result.status = DistributionStatus::InvalidInput;
+        answered = false;
+      }
     }
+    result.iterations += in_vain;
   }
-  result.iterations = std::min(result.iterations + in_vain, maximal_iterations);
+  result.iterations = std::min(result.iterations, maximal_iterations);
   return answered;
 }
 
@@ -618,43 +624,53 @@ void WrenchDistribution::Workspace::keepForces() {
     slots[solved[k]].former_force = result.contacts[k].force;
 }
 
-// Contacts whose sets are known.
-bool WrenchDistribution::Workspace::distributeBySets(double minimal_scale) {
+// Contacts whose sets are known. Returns false if there is no answer.
+bool WrenchDistribution::Workspace::solveSets(double minimal_scale) {
   problem.wrench = result.wrench;
   problem.wrench_weights = settings;
   problem.minimal_scale = minimal_scale;
   sets.setMaximalIterations(maximal_iterations);
   sets.setWarmStart(warm_start);
-  const DistributionSolution& solution = sets.solve(problem);
+  const DistributionSolution& solution =
+      std::exchange(are_sets_new, false) ? sets.solve(problem) : sets.solveMoved(problem);
   if (has_sets) result.scale = problem.scale();
   result.status = solution.status;
   result.iterations = solution.iterations;
-  if (result.status != DistributionStatus::Solved && result.status != DistributionStatus::Relaxed)
-    return false;
+  return result.status == DistributionStatus::Solved ||
+         result.status == DistributionStatus::Relaxed;
+}
+
+void WrenchDistribution::Workspace::writeAnswerOfSets() {
+  const DistributionSolution& solution = sets.solution();
   result.achieved = solution.achieved;
   result.residual = result.wrench - result.achieved;
   result.cost = solution.cost;
   result.wrench_multipliers = solution.multipliers;
-  for (std::size_t k = 0; k < result.contacts.size(); ++k) {
-    Contact& contact = result.contacts[k];
-    contact.force = solution.forces[k];
-    contact.active.setConstant(false);
-    contact.multipliers.setZero();
-    contact.relaxation_multipliers.setZero();
-  }
-  if (!has_sets) writeMultipliers(solution);
-  return true;
+  for (std::size_t k = 0; k < result.contacts.size(); ++k)
+    result.contacts[k].force = solution.forces[k];
+  if (has_multipliers)
+    for (Contact& contact : result.contacts) {
+      contact.active.setConstant(false);
+      contact.multipliers.setZero();
+      contact.relaxation_multipliers.setZero();
+    }
+  has_multipliers = !has_sets && writeMultipliers(solution);
 }
 
 // Multipliers of the inequalities that the forces are at: what W² λ = NEᵀ ν − Aᵀ μ and
-// NEᵀ D² r = Aᵀ μ' leave for each component, and last for the normal force.
-void WrenchDistribution::Workspace::writeMultipliers(const DistributionSolution& solution) {
-  const bool is_relaxed = solution.status == DistributionStatus::Relaxed;
+// NEᵀ D² r = Aᵀ μ' leave for each component, and last for the normal force. Returns whether there
+// are any.
+bool WrenchDistribution::Workspace::writeMultipliers(const DistributionSolution& solution) {
+  // Or hardly out of reach, which no answer with all digits is.
+  const bool is_relaxed = solution.status == DistributionStatus::Relaxed ||
+                          (solution.is_clear && !solution.is_accurate);
   const Vector6 distance = weighted(settings.cwiseAbs2(), solution.residual);
+  bool are_any = false;
   for (std::size_t k = 0; k < solved.size(); ++k) {
     Contact& contact = result.contacts[k];
     const auto& bounds = solution.bounds[k];
     if (bounds.isZero()) continue;
+    are_any = true;
     const auto write = [&](Eigen::Index row, const Row& side, double rest, double of_distance) {
       contact.active[row] = true;
       if (is_relaxed) contact.relaxation_multipliers[row] = std::max(0., of_distance / side.factor);
@@ -688,14 +704,18 @@ void WrenchDistribution::Workspace::writeMultipliers(const DistributionSolution&
             rest_of_normal - findRest(kNormal),
             distance_of_normal - contact.NE.col(kNormal).dot(distance));
   }
+  return are_any;
 }
 
-// Whether an answer for pyramids has all digits; else others may know it better.
+// Whether an answer for pyramids without all digits proves itself; else others may know it better.
 bool WrenchDistribution::Workspace::isCertain(const DistributionSolution& solution) const {
-  if (solution.is_accurate) return true;
   const double distance = weighted(settings, solution.residual).norm() / result.scale;
-  return solution.status == DistributionStatus::Solved && distance <= kInaccuracy &&
-         result.isOptimal(kProof);
+  // What is missing has a price, by the multipliers.
+  const double price =
+      solution.multipliers.cwiseQuotient(settings).norm() * distance * result.scale;
+  const bool is_exact = solution.status == DistributionStatus::Solved && distance <= kInaccuracy &&
+                        price <= kNegligible * solution.cost;
+  return (solution.is_clear || is_exact) && result.isOptimal(kProof);
 }
 
 // Few problems need more digits than double has: those where contacts are nearly parallel, and
@@ -735,6 +755,7 @@ bool WrenchDistribution::Workspace::distributeBy(TwoStageSolver<Scalar>& solver)
 template <class Scalar>
 void WrenchDistribution::Workspace::writeAnswer(TwoStageSolver<Scalar>& solver) {
   solver.writeAnswer(result, unit, overall_weight);
+  has_multipliers = true;
   sumUp();
 }
 

@@ -342,12 +342,19 @@ SetVerdict check(const SetProblem& made, const dynacom::DistributionSolution& so
     cost += contact.weights.cast<Real>().cwiseProduct(off).squaredNorm() / 2;
   }
   constexpr double kExposed = 1e-7;
-  for (std::size_t way = 0; way < (relaxed ? 12 : 1); ++way) {
+  // A wrench that is hardly out of reach is Solved, with the closest one as well: then its
+  // residual, as it is said to be, is more than rounding.
+  const Vector6 exposing =
+      relaxed ? direction
+              : Vector6(weights.cwiseAbs2().cwiseProduct(solution.residual.cast<Real>()));
+  const int ways = relaxed || size > 1e-11 * scale ? 12 : 1;
+  for (int way = relaxed ? 0 : -1; way < ways; ++way) {
     // With the residual times ever more, it exposes the same faces as on its own.
-    const bool on_faces = relaxed && way == 0;
+    const bool on_faces = way == 0;
+    if (on_faces && ways == 1) continue;
     Vector6 multipliers = solution.multipliers.cast<Real>();
-    if (relaxed && !on_faces)
-      multipliers += direction / direction.norm() * std::max(multipliers.norm(), Real(1e-30)) *
+    if (way > 0)
+      multipliers += exposing / exposing.norm() * std::max(multipliers.norm(), Real(1e-30)) *
                      std::pow(Real(10), Real(way));
     Real gap = 0;
     for (std::size_t k = 0; k < made.contacts.size(); ++k) {
@@ -356,8 +363,8 @@ SetVerdict check(const SetProblem& made, const dynacom::DistributionSolution& so
       const Vector downhill =
           pullOf(contact, multipliers) - contact.weights.cast<Real>().cwiseAbs2().cwiseProduct(
                                              force - contact.reference.cast<Real>());
-      const Vector pull = pullOf(contact, direction);
-      gap += (on_faces ? supportOnFace(contact, pull, kExposed * direction.norm(), downhill, far)
+      const Vector pull = pullOf(contact, exposing);
+      gap += (on_faces ? supportOnFace(contact, pull, kExposed * exposing.norm(), downhill, far)
                        : supportOf(contact, downhill, far)) -
              downhill.dot(force);
     }

@@ -97,17 +97,20 @@ BOOST_AUTO_TEST_CASE(projections_are_the_nearest_points_and_jacobians_their_chan
       set.project(point + step * direction, after);
       Vector6 change = direction;
       if (!response.is_free) {
-        change = response.inverse_stiffness * response.growth.dot(direction) * response.growth;
-        change.head<2>() += response.of_friction * direction.head<2>();
-        change.segment<2>(3) += response.of_moments * direction.segment<2>(3);
-        change[5] += response.of_yaw * direction[5];
+        change = response.inverse_stiffness * response.growth.dot(direction) * response.growth +
+                 response.free.cwiseProduct(direction);
+        const Eigen::Vector2d &friction = response.friction_along,
+                              &moments = response.moments_along;
+        change.head<2>() += friction * friction.dot(direction.head<2>());
+        change.segment<2>(3) += moments * moments.dot(direction.segment<2>(3));
       }
       const Vector6 measured = (after.force - before.force) / (2. * step);
       // Next to a kink both sides differ.
       const bool is_smooth =
           after.is_free == before.is_free &&
-          (after.is_free || ((after.of_friction - before.of_friction).norm() < 1e-4 &&
-                             (after.of_moments - before.of_moments).norm() < 1e-4 &&
+          (after.is_free || (after.free == before.free &&
+                             (after.friction_along - before.friction_along).norm() < 1e-4 &&
+                             (after.moments_along - before.moments_along).norm() < 1e-4 &&
                              (after.growth - before.growth).norm() < 1e-4));
       if (is_smooth) BOOST_TEST((measured - change).norm() < 1e-4 * (1. + measured.norm()));
     }
@@ -289,4 +292,56 @@ BOOST_AUTO_TEST_CASE(a_proof_is_none_for_other_forces) {
   other = solution;
   other.forces[0][0] = 0.6 * other.forces[0][2];
   BOOST_TEST(!other.isOptimal(problem));
+}
+
+BOOST_AUTO_TEST_CASE(what_has_only_moved_has_the_same_answer) {
+  for (std::size_t kind = 0; kind < kSetKindNames.size(); ++kind) {
+    SetProblemGenerator generator(31);
+    DistributionSolver moved, fresh;
+    moved.setWarmStart(false);
+    for (int trial = 0; trial < 20; ++trial) {
+      DistributionProblem problem = generator.next(static_cast<SetKind>(kind)).problem;
+      moved.solve(problem);
+      for (DistributionProblem::Contact& contact : problem.contacts)
+        contact.lever += Eigen::Vector3d(0.01, -0.02, 0.03);
+      problem.wrench *= 1.1;
+      problem.wrench_weights[0] *= 2.;
+      const DistributionSolution& one = moved.solveMoved(problem);
+      const DistributionSolution& other = fresh.solve(problem);
+      fresh.forget();
+      BOOST_TEST((one.status == other.status));
+      BOOST_TEST(one.achieved == other.achieved);
+      BOOST_TEST(one.cost == other.cost);
+    }
+  }
+  DistributionSolver solver;
+  DistributionProblem problem = stand(Section::disc(0.5));
+  solver.solve(problem);
+  problem.contacts[1].set = ContactSet::point(Section::disc(0.5));
+  BOOST_TEST(throws<std::invalid_argument>([&] { solver.solveMoved(problem); },
+                                           {"solveMoved()", "contacts[1]"}));
+  problem.contacts.pop_back();
+  BOOST_TEST(throws<std::invalid_argument>([&] { solver.solveMoved(problem); },
+                                           {"solveMoved()", "2", "1"}));
+}
+
+// Without multipliers of its own, since those of what is out of reach grow without limit.
+BOOST_AUTO_TEST_CASE(what_is_hardly_out_of_reach_is_answered_by_the_closest) {
+  for (const Section& friction : {Section::disc(0.5), Section::rectangle({-0.5, -0.5}, {0.5, 0.5})})
+    for (const double beyond : {1e-6, 1e-7, 1e-9, 1e-10}) {
+      DistributionProblem problem = stand(friction);
+      problem.wrench << 450., 0., 900., 0., -405., 0.;  // all that friction holds
+      problem.wrench[0] += beyond * problem.scale();
+      problem.wrench[4] -= 0.9 * beyond * problem.scale();
+      DistributionSolver solver;
+      const DistributionSolution& solution = solver.solve(problem);
+      const bool is_told = beyond > 1e-8;
+      BOOST_TEST((solution.status ==
+                  (is_told ? DistributionStatus::Relaxed : DistributionStatus::Solved)));
+      BOOST_TEST(solution.is_clear);
+      BOOST_TEST(!solution.is_accurate);
+      BOOST_TEST(solution.isOptimal(problem, 1e-8));
+      BOOST_TEST(solution.residual.norm() > 0.5 * beyond * problem.scale());
+      BOOST_TEST(solution.iterations <= 20);
+    }
 }

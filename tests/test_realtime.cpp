@@ -346,10 +346,12 @@ class ControlLoop {
     begin("wrenches for the robust solvers");
     dynacom_.setWarmStart(false);
     place();
+    dynacom_.setWrenchWeights(far_apart_);
     for (const Vector6& wrench : next_to_boundary_) {
       distribute(wrench);
       count();
     }
+    dynacom_.setWrenchWeights(Vector6::Ones());
     begin("no contact");
     for (const std::string& name : names_) dynacom_.deactivateContact(name);
     distribute(-groundWrench());
@@ -364,6 +366,7 @@ class ControlLoop {
     std::array<int, 4> asked{};
     dynacom_.setWarmStart(false);
     place();
+    dynacom_.setWrenchWeights(far_apart_);
     for (const Vector6& wrench : next_to_boundary_) {
       distribute(wrench);
       ++asked[static_cast<std::size_t>(countAskedSolvers(dynacom_.getDistribution()))];
@@ -403,8 +406,8 @@ class ControlLoop {
     DynaCoM placed = dynacom_;
     placed.computeDynamics(rest_.q, rest_.v, rest_.a);
     // On the same facet of friction in all contacts, but for very little.
-    for (int i = 0; i < 30; ++i) {
-      const double beyond = std::pow(10., -4. - 0.3 * i) * (i % 2 == 0 ? 1. : -1.);
+    for (int i = 0; i < 60; ++i) {
+      const double beyond = std::pow(10., -4. - 0.15 * i) * (i % 2 == 0 ? 1. : -1.);
       Vector6 wrench = Vector6::Zero();
       for (const std::string& name : names_) {
         const auto& ne = placed.getContact(name)->ne_A();
@@ -445,6 +448,8 @@ class ControlLoop {
   Vector6 external_;
   std::vector<SE3> poses_;
   std::vector<Vector6> next_to_boundary_;
+  // With weights so far apart, rounding decides what is next to the boundary.
+  const Vector6 far_apart_ = (Vector6() << 1., 1., 1., 1e4, 1e4, 1e4).finished();
   double sum_ = 0.;
 };
 

@@ -63,7 +63,8 @@ struct DYNACOM_EXPORT DistributionSolution {
   double cost = 0.;                                     ///< ½ Σ ‖W (λ − λ₀)‖²
   /// ν of NE λ = achieved in the minimum of the cost: each λ is the projection of λ₀ + W⁻² NEᵀ ν,
   /// in the metric of W, on its set, or where the wrench is out of reach, on the face of that in
-  /// which NEᵀ D² residual · λ is largest.
+  /// which NEᵀ D² residual · λ is largest. It may be so by less than the tolerance that makes it
+  /// Solved: then ν would grow without limit.
   Vector6 multipliers = Vector6::Zero();
   /// Of each contact and component the bound that it is at, −1 or 1, or 0: of f_z its own bounds,
   /// of others those that grow with it. Of sections that are no rectangles both components are 1 on
@@ -77,6 +78,9 @@ struct DYNACOM_EXPORT DistributionSolution {
   /// has led to it, and, of Relaxed ones, next to the boundary and where rounding decides what the
   /// residual exposes.
   bool is_accurate = false;
+  /// Whether it has all digits but for how close the boundary is, too: its faces are known for
+  /// sure, and the forces on them, but of the residual not more digits than it is large.
+  bool is_clear = false;
 
   /// Whether this is the answer to a problem, judged by nothing but both: forces in their sets; no
   /// reachable wrench closer (the support functions of the sets in the direction of the residual
@@ -119,7 +123,12 @@ class DYNACOM_EXPORT DistributionSolver {
   /// @return the answer, until the next call; InvalidInput if a wrench or a placement is not finite
   const DistributionSolution& solve(const DistributionProblem& problem);
 
-  /// What the last solve() has returned.
+  /// The same for a problem that differs from that of the last solve() in rotations, levers, the
+  /// wrench, its weights and minimal_scale alone: nothing else of contacts is looked at again.
+  /// @throws std::invalid_argument if the contacts are more or fewer, or have other sizes
+  const DistributionSolution& solveMoved(const DistributionProblem& problem);
+
+  /// What the last of these has returned.
   const DistributionSolution& solution() const;
 
  private:

@@ -18,11 +18,12 @@
 namespace dynacom {
 
 using Eigen::Index;
-using Eigen::Matrix2d;
 using Eigen::Matrix3d;
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 using internal::Factors6;
 using internal::ScaledSet;
+using internal::SumOfSquares6;
 using internal::throwInvalid;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = DistributionProblem::Vector6;
@@ -44,8 +45,15 @@ struct Tolerances {
   // steps there may be: far more than any problem has taken.
   static constexpr double flat = 0.6, armijo = 1e-4;
   static constexpr int cuts = 40, steps = 60;
-  // How many steps are tried without slack: nearly all wrenches within reach take one or two.
+  // Where a step is cut in other ways than by its slopes, that is which part of what is left; a
+  // step that was cut as often leads far beyond kinks, and the next one is damped, ten times more
+  // each.
+  static constexpr double back = 0.25;
+  static constexpr int many_cuts = 3;
+  // How many steps are tried without slack: nearly all wrenches within reach take one or two. More
+  // are where the last has left less than this of what was missing.
   static constexpr int direct_steps = 2;
+  static constexpr double fast = 0.3;
   // What part of the largest pivot of the compliance the least must be for that: more digits than
   // this leaves are lost.
   static constexpr double full_rank = 1e-9;
@@ -56,6 +64,8 @@ struct Tolerances {
   // faces.
   static constexpr double first_slack = 1e-4, least_slack = 1e-14, slack_factor = 0.05, fall = 0.2;
   static constexpr int rounds = 40, slow_rounds = 4;
+  // When that little is missing, it is tried without slack.
+  static constexpr double close = 1e-2;
   // By which part of what is missing a round may still change that, and how much closer a wrench
   // may be, for an answer where no proof is found: less than that no motion or robot is known by.
   static constexpr double settled = 1e-3, near = 1e-5;
@@ -63,11 +73,15 @@ struct Tolerances {
   // Of a direction that faces span, what remains outside of the others: more than the first, it is
   // one of its own, less than the second, it is rounding.
   static constexpr double independent = 1e-6, dependent = 1e-11;
+  // And what it is plainly, next to the boundary, too; so of what exposes a face.
+  static constexpr double plainly = 0.1;
   // Of the residual, a component that exposes a face.
   static constexpr double exposed = 1e-9;
-  // How far the closest wrench has to be away, times the ratio of wrench weights, so that its
-  // direction has digits enough.
-  static constexpr double far = 1e-4;
+  // A residual that is no more may be rounding. One that has all digits is more than the other,
+  // times the ratio of wrench weights.
+  static constexpr double some = 2e-12, far = 1e-4;
+  // Of components of the residual, how many times what may be rounding is clearly more.
+  static constexpr double clear = 1e4;
 };
 
 double normOf(const Vector6& wrench) {
@@ -90,19 +104,6 @@ void withSize(int size, Function function) {
     function(std::integral_constant<int, 3>());
 }
 
-// Adds [a b] J [a b]ᵀ for a symmetric J.
-template <class Columns, class Sum>
-void addPair(const Columns& columns, const Matrix2d& J, Sum&& sum) {
-  const auto a = columns.col(0), b = columns.col(1);
-  if (J(0, 1) != 0.) {
-    const Eigen::Matrix<double, Columns::RowsAtCompileTime, 2> both = columns * J;
-    sum.noalias() += both * columns.transpose();
-    return;
-  }
-  if (J(0, 0) != 0.) sum.noalias() += J(0, 0) * a * a.transpose();
-  if (J(1, 1) != 0.) sum.noalias() += J(1, 1) * b * b.transpose();
-}
-
 template <class Element>
 struct Range {
   Element *first, *last;
@@ -116,8 +117,8 @@ struct Block {
   // What `set` is made of.
   bool is_described = false;
   ContactSet described;
-  DistributionProblem::Components described_weights;
-  double described_largest = 0.;
+  Vector6 described_weights;
+  bool has_unit = false;             // whether bounds of forces are in units
   Vector6 weights, inverse_weights;  // W over the largest weight of all
   bool has_reference = false;
   Vector6 reference;            // W λ₀ over the unit
@@ -127,15 +128,15 @@ struct Block {
   ScaledSet::Response response;
 
   void place(const DistributionProblem::Contact& contact, const Vector6& wrench_weights) {
-    const auto of_force = wrench_weights.head<3>(), of_moment = wrench_weights.tail<3>();
-    for (int axis = 0; axis < 3; ++axis) {
-      const Vector3d direction = contact.rotation.col(axis);
-      const double force = inverse_weights[axis];
-      e.col(axis).head<3>() = force * of_force.cwiseProduct(direction);
-      e.col(axis).tail<3>() = force * of_moment.cwiseProduct(contact.lever.cross(direction));
-      if (size == 6)
-        e.col(3 + axis).tail<3>() = inverse_weights[3 + axis] * of_moment.cwiseProduct(direction);
-    }
+    const Matrix3d R = contact.rotation * inverse_weights.head<3>().asDiagonal();
+    const Vector3d& p = contact.lever;
+    e.topLeftCorner<3, 3>() = wrench_weights.head<3>().asDiagonal() * R;
+    e.block<1, 3>(3, 0) = wrench_weights[3] * (p.y() * R.row(2) - p.z() * R.row(1));
+    e.block<1, 3>(4, 0) = wrench_weights[4] * (p.z() * R.row(0) - p.x() * R.row(2));
+    e.block<1, 3>(5, 0) = wrench_weights[5] * (p.x() * R.row(1) - p.y() * R.row(0));
+    if (size == 6)
+      e.bottomRightCorner<3, 3>() = wrench_weights.tail<3>().asDiagonal() * contact.rotation *
+                                    inverse_weights.tail<3>().asDiagonal();
   }
 
   // eᵀ ν.
@@ -155,44 +156,40 @@ struct Block {
     return wrench;
   }
 
-  // Adds the lower half of e eᵀ, which is all that Factors6 reads.
-  void addFreeCompliance(Matrix6& sum) const {
-    internal::unroll6([&](auto column) {
-      constexpr int i = column, below = 6 - i;
-      auto part = sum.col(i).template tail<below>();
-      for (int k = 0; k < 3; ++k) part += e(i, k) * e.col(k).template tail<below>();
-      if constexpr (i >= 3)
-        for (int k = 3; k < size; ++k) part += e(i, k) * e.col(k).template tail<below>();
-    });
+  // Adds e eᵀ.
+  void addFreeCompliance(SumOfSquares6& sum) const {
+    for (int k = 0; k < 3; ++k) sum.add(e.col(k));
+    if (size == 6)
+      for (int k = 3; k < 6; ++k) sum.add<3>(e.col(k));
   }
 
-  // Adds e diag(friction, 0, moments, yaw) eᵀ.
-  void addCompliance(const Matrix2d& friction, const Matrix2d& moments, double yaw,
-                     Matrix6& sum) const {
-    addPair(e.leftCols<2>(), friction, sum);
-    if (size == 3) return;
-    auto of_moment = sum.bottomRightCorner<3, 3>();
-    addPair(e.block<3, 2>(3, 3), moments, of_moment);
-    if (yaw != 0.) of_moment.noalias() += yaw * e.col(5).tail<3>() * e.col(5).tail<3>().transpose();
+  // Adds the same of points that move along a line in the plane of two components.
+  void addAlong(const Vector2d& friction, const Vector2d& moments, SumOfSquares6& sum) const {
+    if (!friction.isZero(0.)) sum.add(e.leftCols<2>() * friction);
+    if (!moments.isZero(0.)) sum.add<3>(e.middleCols<2>(3) * moments);
   }
 
   // Adds e J eᵀ with J the Jacobian of the projection.
-  void addCompliance(Matrix6& sum) const {
+  void addCompliance(SumOfSquares6& sum) const {
     if (response.is_free) {
       addFreeCompliance(sum);
       return;
     }
-    addCompliance(response.of_friction, response.of_moments, response.of_yaw, sum);
-    if (response.inverse_stiffness == 0.) return;
-    const Vector6 growth = wrenchOf(response.growth);
-    sum.noalias() += response.inverse_stiffness * growth * growth.transpose();
+    for (int k = 0; k < 3; ++k)
+      if (response.free[k] != 0.) sum.add(e.col(k));
+    for (int k = 3; k < size; ++k)
+      if (response.free[k] != 0.) sum.add<3>(e.col(k));
+    addAlong(response.friction_along, response.moments_along, sum);
+    if (response.inverse_stiffness > 0.)
+      sum.add(std::sqrt(response.inverse_stiffness) * wrenchOf(response.growth));
   }
 
   // Of each component what decides at which bound it is: what makes the distance smaller, or else
   // the cost.
   Vector6 decidingPull(const Vector6& residual) const {
     const Vector6 of_distance = pullOf(residual);
-    const Vector6 rounding = Tolerances::exposed * residual.norm() * reach();
+    const Vector6 rounding =
+        (Tolerances::exposed * residual.norm() + Tolerances::rounding) * reach();
     return (of_distance.array().abs() > rounding.array()).select(of_distance, pull);
   }
 
@@ -257,27 +254,23 @@ double DistributionProblem::scale() const {
                   normOf(wrench_weights.cwiseProduct(wrench)));
 }
 
-bool DistributionSolution::isOptimal(const DistributionProblem& problem, double tolerance) const {
+namespace {
+
+// Whether forces give what they are said to, in their sets, and none are cheaper.
+// @param on_faces  of those in the faces that the residual exposes, where nothing is closer
+bool isCheapest(const DistributionSolution& solution, const DistributionProblem& problem,
+                double tolerance, bool on_faces) {
   using Components = DistributionProblem::Components;
   const double scale = problem.scale();
   const Vector6& D = problem.wrench_weights;
-  const double size = D.cwiseProduct(residual).norm();
-  if (status == DistributionStatus::NoContact)
-    return problem.contacts.empty() && size > Tolerances::reach * scale;
-  const bool relaxed = status == DistributionStatus::Relaxed;
-  if (status != DistributionStatus::Solved && !relaxed) return false;
-  if (forces.size() != problem.contacts.size()) return false;
-  if (relaxed ? !(size >= Tolerances::reach * scale * (1. - tolerance))
-              : !(size <= Tolerances::reach * scale * (1. + tolerance)))
-    return false;
-
+  const double size = D.cwiseProduct(solution.residual).norm();
   const double unit = scale > 0. ? scale / D.maxCoeff() : 1.;
-  const Vector6 direction = D.cwiseAbs2().cwiseProduct(residual);
+  const Vector6 direction = D.cwiseAbs2().cwiseProduct(solution.residual);
   Vector6 given = Vector6::Zero();
   double gap = 0., distance_gap = 0., all_costs = 0.;
-  for (std::size_t k = 0; k < forces.size(); ++k) {
+  for (std::size_t k = 0; k < solution.forces.size(); ++k) {
     const DistributionProblem::Contact& contact = problem.contacts[k];
-    const Components& force = forces[k];
+    const Components& force = solution.forces[k];
     const Index n = contact.set.size();
     if (force.size() != n || !force.allFinite()) return false;
     const Components weights =
@@ -292,14 +285,14 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
     // Nothing is farther in the direction of the residual, and of what is as far, nothing cheaper.
     const Components pull = NE.transpose() * direction;
     const Components gradient =
-        weights.cwiseAbs2().cwiseProduct(force - reference) - NE.transpose() * multipliers;
+        weights.cwiseAbs2().cwiseProduct(force - reference) - NE.transpose() * solution.multipliers;
     ScaledSet face(contact.set, Vector6::Ones());
     face.setUnit(contact.set, Vector6::Ones(), 1.);
     Vector6 own = Vector6::Zero(), against = Vector6::Zero(), at = Vector6::Zero();
     own.head(n) = pull;
     against.head(n) = -gradient;
     at.head(n) = force;
-    if (relaxed) {
+    if (on_faces) {
       // Components of the residual that expose a face are more than it may be off.
       Vector6 rounding = Vector6::Zero();
       rounding.head(n) = std::max(Tolerances::exposed, 10. * Tolerances::missing * scale / size) *
@@ -310,15 +303,35 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
       face = exposed;
     }
     const double terms = (weights.cwiseAbs2().cwiseProduct(force)).lpNorm<Eigen::Infinity>() +
-                         multipliers.norm() * std::max(1., contact.lever.norm()) +
+                         solution.multipliers.norm() * std::max(1., contact.lever.norm()) +
                          (weights.cwiseAbs2().cwiseProduct(reference)).lpNorm<Eigen::Infinity>();
     gap +=
         std::max(0., face.support(against, Vector6::Constant(tolerance * terms)) - against.dot(at));
     all_costs += terms * force_size;
   }
   return distance_gap <= tolerance * (size * scale + size * size) && gap <= tolerance * all_costs &&
-         D.cwiseProduct(given - achieved).norm() <= tolerance * scale &&
-         D.cwiseProduct(problem.wrench - achieved - residual).norm() <= tolerance * scale;
+         D.cwiseProduct(given - solution.achieved).norm() <= tolerance * scale &&
+         D.cwiseProduct(problem.wrench - solution.achieved - solution.residual).norm() <=
+             tolerance * scale;
+}
+
+}  // namespace
+
+bool DistributionSolution::isOptimal(const DistributionProblem& problem, double tolerance) const {
+  const double scale = problem.scale();
+  const Vector6& D = problem.wrench_weights;
+  const double size = D.cwiseProduct(residual).norm();
+  if (status == DistributionStatus::NoContact)
+    return problem.contacts.empty() && size > Tolerances::reach * scale;
+  if (forces.size() != problem.contacts.size()) return false;
+  if (status == DistributionStatus::Solved)
+    // What is hardly out of reach has no multipliers but on faces.
+    return size <= Tolerances::reach * scale * (1. + tolerance) &&
+           (isCheapest(*this, problem, tolerance, false) ||
+            isCheapest(*this, problem, tolerance, true));
+  return status == DistributionStatus::Relaxed &&
+         size >= Tolerances::reach * scale * (1. - tolerance) &&
+         isCheapest(*this, problem, tolerance, true);
 }
 
 struct DistributionSolver::Workspace {
@@ -347,6 +360,8 @@ struct DistributionSolver::Workspace {
   int iterations = 0, iterations_in_vain = 0;
   bool is_cut = false;  // whether there were not enough
   bool is_accurate = false;
+  bool is_clear = false;     // of multipliers on faces: whether it is, or close to the boundary
+  bool is_on_faces = false;  // whether the multipliers are those of forces on faces
   bool is_found_at_once = false;  // by the first step of all: nothing else leads there faster
 
   using Which = ScaledSet Block::*;
@@ -354,7 +369,8 @@ struct DistributionSolver::Workspace {
   // these, too, where faces hardly span a direction, which is left out then.
   enum class Effort { Little, Usual, All };
 
-  void take(const DistributionProblem& problem, double unit, double overall_weight);
+  void describe(const DistributionProblem& problem);
+  void place(const DistributionProblem& problem, double unit, double overall_weight);
   void evaluate(const Vector6& nu, Which which);
   void factorise(double slack, const Matrix6* outside);
   bool descend(Which which, double slack, const Vector6& centre, int steps,
@@ -365,18 +381,27 @@ struct DistributionSolver::Workspace {
   }
   double findMeanCompliance() const;
   bool startFree();
+  bool isClear() const { return is_on_faces ? is_clear : is_accurate; }
   double enough() const { return std::max(may_lack, Tolerances::rounding * terms); }
   // Whether no step makes what is missing smaller: less than some ten errors of what it is a sum
   // of.
   bool isRounding(double size) const { return size <= 10. * Tolerances::rounding * terms; }
   Vector6 missing() const { return target - achieved; }
+  // What part of the residual exposes nothing: rounding is more, where there is little of it.
+  double exposing() const { return Tolerances::exposed + Tolerances::rounding / residual.norm(); }
   Range<Block> placed() { return {blocks.data(), blocks.data() + block_count}; }
   Range<const Block> placed() const { return {blocks.data(), blocks.data() + block_count}; }
   DistributionStatus search();
+  DistributionStatus relaxed() const {
+    return residual.norm() > Tolerances::reach ? DistributionStatus::Relaxed
+                                               : DistributionStatus::Solved;
+  }
+  void write(double unit);
+  void writeNothing();
   DistributionStatus approach(double slack, Vector6 centre, Effort effort, int rounds);
   bool isReachedWithoutSlack();
   bool relax(const Vector6& start, Effort effort);
-  bool spanFaces(Effort effort, Matrix6& basis, int& rank, Vector6& fixed);
+  bool spanFaces(double independent, double dependent, Matrix6& basis, int& rank, Vector6& fixed);
   bool findResidual(Effort effort, Matrix6& outside);
   bool reachClosest(Effort effort, const Vector6& start, const Matrix6& outside);
   double findGap(double rounding) const;
@@ -385,11 +410,8 @@ struct DistributionSolver::Workspace {
   std::vector<Vector6> directions;
 };
 
-// The problem in units.
-void DistributionSolver::Workspace::take(const DistributionProblem& problem, double unit,
-                                         double overall_weight) {
-  weights = problem.wrench_weights / overall_weight;
-  target = weights.cwiseProduct(problem.wrench) / unit;
+// What of the contacts does not move.
+void DistributionSolver::Workspace::describe(const DistributionProblem& problem) {
   block_count = problem.contacts.size();
   if (blocks.size() < block_count) blocks.resize(block_count);
   directions.reserve(6 * block_count);
@@ -401,32 +423,41 @@ void DistributionSolver::Workspace::take(const DistributionProblem& problem, dou
     const DistributionProblem::Contact& contact = problem.contacts[k];
     Block& block = blocks[k];
     const Index n = contact.set.size();
+    if (block.size != int(n)) block.response = ScaledSet::Response();
     block.size = int(n);
-    const bool is_known =
-        block.is_described && block.described_weights.size() == contact.weights.size() &&
-        block.described_weights == contact.weights && block.described == contact.set;
-    if (!is_known || block.described_largest != largest_weight) {
-      block.weights.setOnes();
-      if (contact.weights.size() > 0) block.weights.head(n) = contact.weights;
-      block.weights.head(n) /= largest_weight;
-      block.inverse_weights = block.weights.cwiseInverse();
-      block.described_largest = largest_weight;
-    }
+    block.has_unit = !contact.set.isCone();
+    block.has_reference = contact.reference.size() > 0;
+    block.weights.setOnes();
+    if (contact.weights.size() > 0) block.weights.head(n) = contact.weights;
+    // By the contact's own weights: what others weigh does not change a bit of it.
+    const bool is_known = block.is_described && block.described_weights == block.weights &&
+                          block.described == contact.set;
     if (!is_known) {
-      // By the contact's own weights: what others weigh does not change a bit of it.
-      Vector6 own = Vector6::Ones();
-      if (contact.weights.size() > 0) own.head(n) = contact.weights;
-      block.set = block.face = ScaledSet(contact.set, own);
+      block.set = block.face = ScaledSet(contact.set, block.weights);
       block.described = contact.set;
-      block.described_weights = contact.weights;
+      block.described_weights = block.weights;
       block.is_described = true;
     }
-    if (!is_known || !contact.set.isCone()) block.set.setUnit(contact.set, block.weights, unit);
+    block.weights.head(n) /= largest_weight;
+    block.inverse_weights = block.weights.cwiseInverse();
+    if (!is_known && !block.has_unit) block.set.setUnit(contact.set, block.weights, 1.);
+  }
+}
+
+// The problem in units.
+void DistributionSolver::Workspace::place(const DistributionProblem& problem, double unit,
+                                          double overall_weight) {
+  weights = problem.wrench_weights / overall_weight;
+  target = weights.cwiseProduct(problem.wrench) / unit;
+  for (std::size_t k = 0; k < block_count; ++k) {
+    const DistributionProblem::Contact& contact = problem.contacts[k];
+    Block& block = blocks[k];
     block.place(contact, weights);
-    block.has_reference = contact.reference.size() > 0;
+    if (block.has_unit) block.set.setUnit(contact.set, block.weights, unit);
     block.reference.setZero();
-    for (Index i = 0; i < contact.reference.size(); ++i)
-      block.reference[i] = contact.reference[i] * block.weights[i] / unit;
+    if (block.has_reference)
+      block.reference.head(block.size) =
+          contact.reference.cwiseProduct(block.weights.head(block.size)) / unit;
   }
 }
 
@@ -457,8 +488,9 @@ void DistributionSolver::Workspace::evaluate(const Vector6& nu, Which which) {
 // How the wrench rises with its multipliers, with slack.
 // @param outside  what to add to that, where faces give no wrenches; or null
 void DistributionSolver::Workspace::factorise(double slack, const Matrix6* outside) {
-  Matrix6 compliance = Matrix6::Zero();
-  for (const Block& block : placed()) block.addCompliance(compliance);
+  SumOfSquares6 sum;
+  for (const Block& block : placed()) block.addCompliance(sum);
+  Matrix6 compliance = sum.toMatrix();
   if (outside) compliance += *outside;
   compliance.diagonal().array() += slack;
   factors.compute(compliance);
@@ -469,19 +501,20 @@ void DistributionSolver::Workspace::factorise(double slack, const Matrix6* outsi
 bool DistributionSolver::Workspace::descend(Which which, double slack, const Vector6& centre,
                                             int steps, const Matrix6* outside) {
   double former = std::numeric_limits<double>::infinity();
+  double damping = 0.;
   for (int step = 0;; ++step) {
     const Vector6 gradient = slack * (multipliers - centre) - missing();
     const double size = gradient.norm();
     // What no step makes smaller, and is small, is rounding.
     if (size <= enough() || (size <= Tolerances::missing && size > 0.5 * former)) return true;
-    former = size;
-    if (step == steps) return false;
+    const double former_size = std::exchange(former, size);
+    if (step >= steps && !(slack == 0. && size < Tolerances::fast * former_size)) return false;
     if (iterations >= maximal_iterations) {
       is_cut = true;
       return false;
     }
     ++iterations;
-    factorise(slack, outside);
+    factorise(slack + damping, outside);
     if (slack == 0. && !hasFullRank()) return false;
     const Vector6 direction = -factors.solve(gradient);
     const double slope = gradient.dot(direction);
@@ -492,7 +525,8 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
     // Where the dual has no digits for what the step promises, the gradient has.
     const bool is_local = -slope <= Tolerances::rounding * std::abs(cost);
     double length = 1., lower = 0., upper = 1., lower_slope = slope, upper_slope = 0.;
-    for (int cut = 0;; ++cut) {
+    int cut = 0;
+    for (;; ++cut) {
       if (cut == Tolerances::cuts) return false;
       evaluate(start + length * direction, which);
       const Vector6 residual = slack * (multipliers - centre) - missing();
@@ -514,21 +548,25 @@ bool DistributionSolver::Workspace::descend(Which which, double slack, const Vec
       if (cut % 2 == 0)
         length = lower + (upper - lower) * lower_slope / (lower_slope - upper_slope);
       else
-        length = 0.5 * (lower + upper);
+        length = lower + Tolerances::back * (upper - lower);
     }
+    if (cut >= Tolerances::many_cuts)
+      damping = 10. * (slack + damping);
+    else if (cut == 0)
+      damping = 0.;
   }
 }
 
 // The multipliers that are the answer if all forces are inside of their sets.
 bool DistributionSolver::Workspace::startFree() {
   ++iterations;
-  Matrix6 compliance = Matrix6::Zero();
+  SumOfSquares6 compliance;
   Vector6 rest = target;
   for (const Block& block : placed()) {
     block.addFreeCompliance(compliance);
     if (block.has_reference) rest -= block.wrenchOf(block.reference);
   }
-  factors.compute(compliance);
+  factors.compute(compliance.toMatrix());
   const bool has_full_rank = hasFullRank();
   evaluate(has_full_rank ? factors.solve(rest) : Vector6(Vector6::Zero()), &Block::set);
   return has_full_rank;
@@ -536,17 +574,17 @@ bool DistributionSolver::Workspace::startFree() {
 
 DistributionStatus DistributionSolver::Workspace::search() {
   residual.setZero();
+  const bool was_on_faces = std::exchange(is_on_faces, false);
   if (warm_start && has_answer) {
-    const bool was_reached = solution.status == DistributionStatus::Solved;
     const Vector6 last = multipliers;
-    evaluate(was_reached ? last : slackened, &Block::set);
+    evaluate(was_on_faces ? slackened : last, &Block::set);
     if (!std::isfinite(achieved.sum())) return DistributionStatus::InvalidInput;
-    if (was_reached) {
+    if (!was_on_faces) {
       if (descend(&Block::set, 0., last, Tolerances::direct_steps))
         return DistributionStatus::Solved;
     } else {
       const DistributionStatus status = relax(last, Effort::Little)
-                                            ? DistributionStatus::Relaxed
+                                            ? relaxed()
                                             : approach(last_slack, last_centre, Effort::Little, 1);
       // Without all digits, an answer is not to depend on the last one.
       if (status != DistributionStatus::NumericalFailure && is_accurate) return status;
@@ -581,7 +619,7 @@ DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6
     descend(&Block::set, slack, centre, Tolerances::steps);
     const Vector6 lacking = missing();
     const double size = lacking.norm();
-    if (size <= Tolerances::reach && isReachedWithoutSlack()) return DistributionStatus::Solved;
+    if (size <= Tolerances::close && isReachedWithoutSlack()) return DistributionStatus::Solved;
     if (is_cut) break;
     if (size <= enough()) return DistributionStatus::Solved;
     // What stays is out of reach, if it proves so.
@@ -589,10 +627,9 @@ DistributionStatus DistributionSolver::Workspace::approach(double slack, Vector6
     last_slack = slack;
     last_centre = centre;
     if (round == 0 || stays) {
-      if (relax(multipliers, effort)) return DistributionStatus::Relaxed;
-      // No smaller slack will tell more.
-      if (slack <= least_slack && relax(multipliers, Effort::All))
-        return DistributionStatus::Relaxed;
+      // No smaller slack will tell more than the least.
+      if (relax(multipliers, effort) || (slack <= least_slack && relax(multipliers, Effort::All)))
+        return relaxed();
     }
     const double change = (lacking - former_missing).norm() / size;
     if (change <= least_change) {
@@ -627,8 +664,8 @@ bool DistributionSolver::Workspace::isReachedWithoutSlack() {
 
 // An orthonormal basis of the wrenches that the faces span, and the wrench that all forces in them
 // share. Returns false if the rank is not certain, and is to be.
-bool DistributionSolver::Workspace::spanFaces(Effort effort, Matrix6& basis, int& rank,
-                                              Vector6& fixed) {
+bool DistributionSolver::Workspace::spanFaces(double independent, double dependent, Matrix6& basis,
+                                              int& rank, Vector6& fixed) {
   directions.clear();
   fixed.setZero();
   for (const Block& block : placed()) {
@@ -637,9 +674,7 @@ bool DistributionSolver::Workspace::spanFaces(Effort effort, Matrix6& basis, int
     for (int k = 0; k < span.count; ++k)
       directions.push_back(block.wrenchOf(span.axes.col(k)).normalized());
   }
-  return internal::findSpan(directions, Tolerances::independent,
-                            effort == Effort::All ? Tolerances::independent : Tolerances::dependent,
-                            basis, rank);
+  return internal::findSpan(directions, independent, dependent, basis, rank);
 }
 
 // What is missing of the closest wrench, from the forces at hand and a guess: the part of the
@@ -649,21 +684,23 @@ bool DistributionSolver::Workspace::spanFaces(Effort effort, Matrix6& basis, int
 //
 // @param outside  the projector on what they do not span
 bool DistributionSolver::Workspace::findResidual(Effort effort, Matrix6& outside) {
+  const double dependent = effort == Effort::All ? Tolerances::independent : Tolerances::dependent;
   bool is_found = false, is_near = false;
   for (int step = 0; step < Tolerances::steps && !is_found; ++step) {
-    Matrix6 bend = Matrix6::Zero();
+    SumOfSquares6 bend;
     bool is_bent = false;
     for (Block& block : placed()) {
       ScaledSet::Bend own;
       block.set.hold(block.response, block.pullOf(residual), block.face, own);
       if (own.friction.isZero(0.) && own.moments.isZero(0.)) continue;
       is_bent = true;
-      block.addCompliance(own.friction, own.moments, 0., bend);
+      block.addAlong(own.friction, own.moments, bend);
     }
     Matrix6 basis;
     int rank = 0;
     Vector6 fixed;
-    if (!spanFaces(effort, basis, rank, fixed) || rank == 6) return false;
+    if (!spanFaces(Tolerances::independent, dependent, basis, rank, fixed) || rank == 6)
+      return false;
     outside.noalias() = Matrix6::Identity() - basis * basis.transpose();
     const Vector6 rest = target - fixed;
     if (!is_bent) {
@@ -672,26 +709,25 @@ bool DistributionSolver::Workspace::findResidual(Effort effort, Matrix6& outside
       continue;
     }
     const Vector6 former = residual;
-    const Eigen::PartialPivLU<Matrix6> lu(Matrix6::Identity() + bend);
+    const Matrix6 bent = bend.toMatrix().selfadjointView<Eigen::Lower>();
+    const Eigen::PartialPivLU<Matrix6> lu(Matrix6::Identity() + bent);
     residual += lu.solve(rest - residual);  // but for what faces make up for
     if (rank > 0) {
       using Spanned = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
       using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
       const auto spanned = basis.leftCols(rank);
-      const Spanned bent = lu.solve(spanned);
-      const Eigen::LDLT<Square> along(Square(spanned.transpose() * bent));
-      residual -= bent * along.solve(spanned.transpose() * residual);
+      const Spanned turned = lu.solve(spanned);
+      const Eigen::LDLT<Square> along(Square(spanned.transpose() * turned));
+      residual -= turned * along.solve(spanned.transpose() * residual);
     }
     // One step more than it takes: where a disc is hardly pulled, its point has few digits else.
     is_found = is_near;
     is_near = (residual - former).norm() <= Tolerances::missing;
   }
   const double size = residual.norm();
-  if (!is_found || !(size > Tolerances::reach) || !std::isfinite(size)) return false;
+  if (!is_found || !(size > Tolerances::some) || !std::isfinite(size)) return false;
   for (Block& block : placed())
-    if (!block.set.expose(block.pullOf(residual),
-                          (Tolerances::exposed * size + Tolerances::rounding) * block.reach(),
-                          block.face))
+    if (!block.set.expose(block.pullOf(residual), exposing() * size * block.reach(), block.face))
       return false;
   return true;
 }
@@ -734,15 +770,19 @@ bool DistributionSolver::Workspace::reachOnFaces(Effort effort, const Matrix6& o
 // Out of reach: the closest wrench, then the cheapest forces of those on the faces that its
 // residual exposes, and the proof of both.
 //
-// What the minimum with slack lacks is nearly the residual.
+// What the minimum with slack lacks is nearly the residual. Of a wrench that is hardly out of
+// reach, whose multipliers grow without limit, this is the answer, too, if rounding decides nothing
+// of it.
 // @param start  from which multipliers on the forces are sought
 bool DistributionSolver::Workspace::relax(const Vector6& start, Effort effort) {
   residual = missing();
-  if (residual.norm() > Tolerances::reach) {
+  if (residual.norm() > Tolerances::some) {
     const Vector6 kept = multipliers;
     Matrix6 outside;
-    if (findResidual(effort, outside) && reachClosest(effort, start, outside)) {
+    if (findResidual(effort, outside) && reachClosest(effort, start, outside) &&
+        (is_clear || residual.norm() > Tolerances::reach)) {
       slackened = kept;
+      is_on_faces = true;
       return true;
     }
     evaluate(kept, &Block::set);
@@ -762,10 +802,18 @@ bool DistributionSolver::Workspace::reachClosest(Effort effort, const Vector6& s
   if (!given) return false;
   if (effort == Effort::All) residual = missing();
   const double size = residual.norm();
-  is_accurate = is_accurate && effort != Effort::All &&
-                size >= Tolerances::far * weights.maxCoeff() / weights.minCoeff() &&
-                exposesClearly();
-  return findGap(Tolerances::exposed) <= Tolerances::reach * size;
+  const double ratio = weights.maxCoeff() / weights.minCoeff();
+  is_clear = is_accurate && effort != Effort::All && size >= Tolerances::some * ratio * ratio &&
+             exposesClearly();
+  is_accurate = is_clear && size >= Tolerances::far * ratio;
+  if (is_clear && !is_accurate) {
+    Matrix6 basis;
+    int rank = 0;
+    Vector6 fixed;
+    is_clear = (missing() - residual).norm() <= Tolerances::rounding * terms &&
+               spanFaces(Tolerances::plainly, Tolerances::dependent, basis, rank, fixed);
+  }
+  return findGap(exposing()) <= Tolerances::reach * size;
 }
 
 // By how much forces could be farther in the direction of the residual: by nothing where no
@@ -791,8 +839,11 @@ bool DistributionSolver::Workspace::exposesClearly() {
     return face.span().count;
   };
   const auto all = placed();
+  const double least = std::max(Tolerances::missing, Tolerances::rounding * terms / size);
+  const double most =
+      std::min(Tolerances::plainly, std::max(Tolerances::reach, Tolerances::clear * least));
   return std::all_of(all.begin(), all.end(), [&](const Block& block) {
-    return countAxes(block, Tolerances::missing) == countAxes(block, Tolerances::reach);
+    return countAxes(block, least) == countAxes(block, most);
   });
 }
 
@@ -826,76 +877,107 @@ void DistributionSolver::forget() { work_->has_answer = false; }
 const DistributionSolution& DistributionSolver::solution() const { return work_->solution; }
 
 const DistributionSolution& DistributionSolver::solve(const DistributionProblem& problem) {
+  const std::size_t contacts = problem.contacts.size();
+  DistributionSolution& solution = work_->solution;
+  work_->has_answer = work_->has_answer && solution.forces.size() == contacts;
+  solution.forces.resize(contacts);
+  solution.bounds.resize(contacts);
+  work_->describe(problem);
+  return solveMoved(problem);
+}
+
+const DistributionSolution& DistributionSolver::solveMoved(const DistributionProblem& problem) {
   Workspace& work = *work_;
   DistributionSolution& solution = work.solution;
   const std::size_t contacts = problem.contacts.size();
-  work.has_answer = work.has_answer && solution.forces.size() == contacts;
-  solution.forces.resize(contacts);
-  solution.bounds.resize(contacts);
+  if (contacts != work.block_count)
+    throwInvalid("solveMoved() needs the contacts of the last solve(), ", work.block_count,
+                 ", got ", contacts);
+  for (std::size_t k = 0; k < contacts; ++k)
+    if (problem.contacts[k].set.size() != work.blocks[k].size ||
+        (problem.contacts[k].reference.size() > 0) != work.blocks[k].has_reference)
+      throwInvalid("solveMoved() needs the contacts of the last solve(), but contacts[", k,
+                   "] has another size, or a reference, or none");
   const Vector6& D = problem.wrench_weights;
-  const double scale = problem.scale();
   const double wrench_size = normOf(problem.wrench);
-  const double overall_weight =
-      wrench_size > 0. ? normOf(D.cwiseProduct(problem.wrench)) / wrench_size : D.maxCoeff();
+  const double weighted_size = normOf(D.cwiseProduct(problem.wrench));
+  const double scale = problem.scale();
+  const double overall_weight = wrench_size > 0. ? weighted_size / wrench_size : D.maxCoeff();
   const double unit = scale / overall_weight;
   work.iterations = work.iterations_in_vain = 0;
   work.is_accurate = true;
   work.is_cut = work.is_found_at_once = false;
+  bool answered = false;
   if (!problem.wrench.allFinite()) {
     solution.status = DistributionStatus::InvalidInput;
   } else if (contacts == 0) {
-    solution.status =
-        wrench_size == 0. || D.cwiseProduct(problem.wrench).norm() <= Tolerances::reach * scale
-            ? DistributionStatus::Solved
-            : DistributionStatus::NoContact;
+    solution.status = weighted_size <= Tolerances::reach * scale ? DistributionStatus::Solved
+                                                                 : DistributionStatus::NoContact;
   } else if (scale == 0.) {
     solution.status = DistributionStatus::Solved;  // by no forces at all
   } else {
-    work.take(problem, unit, overall_weight);
+    work.place(problem, unit, overall_weight);
     solution.status = work.search();
+    answered = solution.status == DistributionStatus::Solved ||
+               solution.status == DistributionStatus::Relaxed;
+    // An answer that the last one's multipliers lead to takes none; it counts as one all the same.
+    work.iterations = std::max(1 - work.iterations_in_vain, work.iterations);
   }
   solution.iterations_in_vain = work.iterations_in_vain;
-  // An answer that the last one's multipliers lead to takes none; it counts as one all the same.
   solution.iterations = work.iterations + work.iterations_in_vain;
-  if (contacts > 0 && scale > 0.) solution.iterations = std::max(1, solution.iterations);
-  const bool answered = contacts > 0 && scale > 0. &&
-                        (solution.status == DistributionStatus::Solved ||
-                         solution.status == DistributionStatus::Relaxed);
   work.has_answer = answered && !work.is_found_at_once;
-  solution.achieved.setZero();
-  solution.multipliers.setZero();
-  const double largest = work.largest_weight;
-  double cost = 0., sizes = 0.;  // the former a difference of the latter
   if (answered) {
-    solution.multipliers = unit * largest * largest * work.weights.cwiseProduct(work.multipliers);
-    solution.achieved = unit * work.achieved.cwiseQuotient(work.weights);
+    work.write(unit);
+  } else {
+    work.writeNothing();
   }
-  for (std::size_t k = 0; k < contacts; ++k) {
-    DistributionProblem::Components& force = solution.forces[k];
-    solution.bounds[k].setZero();
-    if (!answered) {
-      force.setZero(problem.contacts[k].set.size());
-      continue;
-    }
-    const Block& block = work.blocks[k];
+  // That of the closest wrench is known with more digits than the difference has.
+  if (solution.status == DistributionStatus::Relaxed || (answered && work.is_on_faces))
+    solution.residual = unit * work.residual.cwiseQuotient(work.weights);
+  else
+    solution.residual = problem.wrench - solution.achieved;
+  return solution;
+}
+
+void DistributionSolver::Workspace::write(double unit) {
+  const double price = unit * largest_weight * largest_weight;
+  solution.multipliers = price * weights.cwiseProduct(multipliers);
+  solution.achieved = unit * achieved.cwiseQuotient(weights);
+  double cost = 0., sizes = 0.;  // the former a difference of the latter
+  for (std::size_t k = 0; k < block_count; ++k) {
+    const Block& block = blocks[k];
     const Vector6& x = block.response.force;
-    force = (unit * x.cwiseProduct(block.inverse_weights)).head(block.size);
-    if (!block.response.is_free)
-      solution.bounds[k] = block.set.findBounds(block.response, block.decidingPull(work.residual));
+    DistributionProblem::Components& force = solution.forces[k];
+    force.resize(block.size);
+    withSize(block.size, [&](auto n) {
+      force.template head<n>() =
+          unit * x.template head<n>().cwiseProduct(block.inverse_weights.template head<n>());
+    });
+    if (block.response.is_free)
+      solution.bounds[k].setZero();
+    else
+      solution.bounds[k] = block.set.findBounds(block.response, block.decidingPull(residual));
     cost += 0.5 * (x - block.reference).squaredNorm();
     sizes += 0.5 * (x.squaredNorm() + block.reference.squaredNorm());
   }
-  solution.cost = cost * std::pow(unit * largest, 2);
+  solution.cost = cost * unit * price;
   // What of the wrench is rounding has a price, by the multipliers.
-  solution.is_accurate =
-      answered ? work.is_accurate && work.multipliers.norm() * Tolerances::rounding * work.terms <=
-                                         Tolerances::reach * sizes
-               : solution.status == DistributionStatus::Solved;
-  // That of the closest wrench is known with more digits than the difference has.
-  solution.residual = solution.status == DistributionStatus::Relaxed
-                          ? Vector6(unit * work.residual.cwiseQuotient(work.weights))
-                          : Vector6(problem.wrench - solution.achieved);
-  return solution;
+  const double lacking = is_on_faces ? 0. : missing().norm();
+  const bool is_cost_known = multipliers.norm() * std::max(lacking, Tolerances::rounding * terms) <=
+                             Tolerances::reach * sizes;
+  solution.is_accurate = is_accurate && is_cost_known;
+  solution.is_clear = isClear() && is_cost_known;
+}
+
+void DistributionSolver::Workspace::writeNothing() {
+  solution.multipliers.setZero();
+  solution.achieved.setZero();
+  for (std::size_t k = 0; k < block_count; ++k) {
+    solution.forces[k].setZero(blocks[k].size);
+    solution.bounds[k].setZero();
+  }
+  solution.cost = 0.;
+  solution.is_accurate = solution.is_clear = solution.status == DistributionStatus::Solved;
 }
 
 }  // namespace dynacom

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "../pair.hpp"
 
 namespace dynacom::internal {
 
 using Eigen::Index;
-using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
 namespace {
@@ -20,16 +22,7 @@ constexpr double kHeldByCost = 0.05;
 // What is rounding of a sum, over its terms.
 constexpr double kRounding = 4. * std::numeric_limits<double>::epsilon();
 
-// A number limited to an interval that is z times as large, and what that means.
-struct Limited {
-  double value, by_value, by_normal, push;
-};
-Limited limit(double value, double normal, double lower, double upper) {
-  const double low = normal * lower, high = normal * upper;
-  if (value > high || lower == upper) return {high, 0., upper, (value - high) * upper};
-  if (value < low) return {low, 0., lower, (value - low) * lower};
-  return {value, 1., 0., 0.};
-}
+Vector2d perpendicular(const Vector2d& vector) { return {-vector.y(), vector.x()}; }
 
 // The end of an interval that a value is at, −1 or 1; by a pull where it is a point.
 signed char findSide(double value, double lower, double upper, double pull) {
@@ -76,53 +69,22 @@ ScaledSection::Edge::Edge(const Vector2d& first_vertex, const Vector2d& last_ver
 
 ScaledSection::ScaledSection(const Edge& edge) : shape_(Shape::Segment), edge_(edge) {}
 
-bool ScaledSection::contains(const Vector2d& point, double normal) const {
-  switch (shape_) {
-    case Shape::Box:
-      return (point.array() > normal * lower_.array()).all() &&
-             (point.array() < normal * upper_.array()).all();
-    case Shape::Disc:
-      return normal > 0. && point.squaredNorm() < std::pow(radii_.x() * normal, 2);
-    case Shape::Ellipse:
-      return normal > 0. && point.cwiseQuotient(radii_).squaredNorm() < normal * normal;
-    case Shape::Segment:
-      return false;
-    case Shape::Polygon:
-      break;
-  }
-  return std::all_of(polygon_->begin(), polygon_->end(), [&](const Edge& edge) {
-    return edge.outward.dot(point) < normal * edge.offset;
-  });
-}
-
 void ScaledSection::project(const Vector2d& point, double normal, Response& response) const {
   if (normal <= 0.) {
     const Vector2d exposed = findExposed(point);
-    response = {Vector2d::Zero(), Matrix2d::Zero(), exposed, point.dot(exposed),
+    response = {Vector2d::Zero(),     false, Vector2d::Zero(), exposed, point.dot(exposed),
                 exposed.squaredNorm()};
     return;
   }
   switch (shape_) {
-    case Shape::Box: {
-      const Limited x = limit(point.x(), normal, lower_.x(), upper_.x());
-      const Limited y = limit(point.y(), normal, lower_.y(), upper_.y());
-      response.point << x.value, y.value;
-      response.by_point << x.by_value, 0., 0., y.by_value;
-      response.by_normal << x.by_normal, y.by_normal;
-      response.push = x.push + y.push;
-      response.stiffening = response.by_normal.squaredNorm();
-      return;
-    }
     case Shape::Disc: {
       const double radius = radii_.x(), size = point.norm();
       if (size <= radius * normal) break;
-      const Vector2d along = point / size;
-      response.point = radius * normal * along;
-      response.by_point =
-          radius * normal / size * (Matrix2d::Identity() - along * along.transpose());
-      response.by_normal = radius * along;
-      response.push = radius * (size - radius * normal);
-      response.stiffening = radius * radius;
+      const Vector2d outward = point / size;
+      const double bend = std::sqrt(radius * normal / size);
+      response = {radius * normal * outward,         false,
+                  bend * perpendicular(outward),     radius * outward,
+                  radius * (size - radius * normal), radius * radius};
       return;
     }
     case Shape::Ellipse:
@@ -138,31 +100,10 @@ void ScaledSection::project(const Vector2d& point, double normal, Response& resp
         return;
       }
       break;
+    case Shape::Box:
+      break;
   }
-  response = {point, Matrix2d::Identity(), Vector2d::Zero(), 0., 0.};
-}
-
-void ScaledSection::addPush(const Vector2d& point, double normal, double& push,
-                            double& stiffening) const {
-  if (normal > 0. && shape_ == Shape::Box) {
-    for (int k = 0; k < 2; ++k) {
-      const Limited limited = limit(point[k], normal, lower_[k], upper_[k]);
-      push += limited.push;
-      stiffening += limited.by_normal * limited.by_normal;
-    }
-    return;
-  }
-  if (normal > 0. && shape_ == Shape::Disc) {
-    const double radius = radii_.x(), beyond = point.norm() - radius * normal;
-    if (beyond <= 0.) return;
-    push += radius * beyond;
-    stiffening += radius * radius;
-    return;
-  }
-  Response response;
-  project(point, normal, response);
-  push += response.push;
-  stiffening += response.stiffening;
+  response = {point, true, Vector2d::Zero(), Vector2d::Zero(), 0., 0.};
 }
 
 // The points p = A (A + t)⁻¹ g, A the squares of the radii, with pᵀ A⁻¹ p = z²: t > 0 is the root
@@ -181,13 +122,15 @@ void ScaledSection::projectOnEllipse(const Vector2d& point, double normal,
     t += change;
     if (!(change > kRounding * t)) break;
   }
+  // p = F g with F = A (A + t)⁻¹, and what keeps pᵀ A⁻¹ p leaves of F what is along the boundary.
   const Vector2d sums = squares.array() + t;
-  const Vector2d factors = squares.cwiseQuotient(sums);
-  const Vector2d q = factors.cwiseProduct(point).cwiseQuotient(sums);
+  const Vector2d factors = squares.cwiseQuotient(sums), outward = point.cwiseQuotient(sums);
+  const Vector2d q = factors.cwiseProduct(outward);
+  const double size = outward.dot(q);
   response.point = factors.cwiseProduct(point);
-  const double outward = response.point.cwiseQuotient(squares).dot(q);
-  response.by_point = Matrix2d(factors.asDiagonal()) - q * q.transpose() / outward;
-  response.by_normal = q * (normal / outward);
+  response.is_free = false;
+  response.along = std::sqrt(factors.prod() / size) * perpendicular(outward);
+  response.by_normal = q * (normal / size);
   response.push = (point - response.point).dot(response.point) / normal;
   response.stiffening = (response.by_normal.dot(point) - response.push) / normal;
 }
@@ -197,12 +140,14 @@ void ScaledSection::Edge::project(const Vector2d& point, double normal, Response
   const bool is_before = place <= normal * begin;
   if (is_before || place >= normal * end) {
     const Vector2d& vertex = is_before ? first : last;
-    response = {normal * vertex, Matrix2d::Zero(), vertex, (point - normal * vertex).dot(vertex),
-                vertex.squaredNorm()};
+    response = {
+        normal * vertex,     false, Vector2d::Zero(), vertex, (point - normal * vertex).dot(vertex),
+        vertex.squaredNorm()};
     return;
   }
-  response = {place * along() + normal * offset * outward, along() * along().transpose(),
-              offset * outward, (outward.dot(point) - normal * offset) * offset, offset * offset};
+  response = {
+      place * along() + normal * offset * outward,     false,          along(), offset * outward,
+      (outward.dot(point) - normal * offset) * offset, offset * offset};
 }
 
 // The nearest of the edges that a point is beyond, or null: by the square of the distance less that
@@ -286,20 +231,21 @@ ScaledSection ScaledSection::expose(const Vector2d& direction, const Vector2d& r
   return face;
 }
 
-ScaledSection ScaledSection::hold(const Vector2d& point, const Matrix2d& by_point, double normal,
-                                  const Vector2d& direction, Matrix2d& bend) const {
+ScaledSection ScaledSection::hold(const Vector2d& point, const Vector2d& free,
+                                  const Vector2d& along, double normal, const Vector2d& direction,
+                                  Vector2d& bend) const {
   bend.setZero();
   ScaledSection face;
   if (shape_ == Shape::Box) {
     const Vector2d place = point / normal;
-    face.lower_ = (by_point.diagonal().array() != 0.).select(lower_, place);
-    face.upper_ = (by_point.diagonal().array() != 0.).select(upper_, place);
+    face.lower_ = (free.array() != 0.).select(lower_, place);
+    face.upper_ = (free.array() != 0.).select(upper_, place);
     return face;
   }
-  if (by_point.isIdentity(0.)) return *this;
+  if (free[0] != 0.) return *this;
   if (shape_ == Shape::Segment || shape_ == Shape::Polygon) {
     face.lower_ = face.upper_ = point / normal;
-    if (by_point.isZero(0.)) return face;
+    if (along.isZero(0.)) return face;
     if (shape_ == Shape::Segment) return *this;
     const auto findOff = [&](const Edge& edge) {
       return std::abs(edge.outward.dot(point) - normal * edge.offset);
@@ -309,12 +255,11 @@ ScaledSection ScaledSection::hold(const Vector2d& point, const Matrix2d& by_poin
                           [&](const Edge& a, const Edge& b) { return findOff(a) < findOff(b); }));
   }
   // Held by what it costs, and not by the direction, which is far beyond.
-  if (by_point.trace() > kHeldByCost) return *this;
+  if (along.squaredNorm() > kHeldByCost) return *this;
   face.lower_ = face.upper_ = findExposed(direction);
+  // The curvature of the support function, whose gradient is the point.
   const double size = radii_.cwiseProduct(direction).norm();
-  if (size > 0.)
-    bend = normal / size *
-           (Matrix2d(radii_.cwiseAbs2().asDiagonal()) - face.lower_ * face.lower_.transpose());
+  if (size > 0.) bend = radii_.prod() * std::sqrt(normal / size) / size * perpendicular(direction);
   return face;
 }
 
@@ -342,14 +287,14 @@ ScaledSection::Span ScaledSection::span() const {
 }
 
 Eigen::Matrix<signed char, 2, 1> ScaledSection::findBounds(const Vector2d& point,
-                                                           const Matrix2d& by_point, double normal,
+                                                           const Vector2d& free, double normal,
                                                            const Vector2d& pull) const {
   Eigen::Matrix<signed char, 2, 1> bounds = Eigen::Matrix<signed char, 2, 1>::Zero();
   for (int k = 0; k < 2; ++k)
-    if (shape_ != Shape::Box)
-      bounds[k] = by_point.isIdentity(0.) ? 0 : 1;
-    else if (by_point(k, k) == 0.)
-      bounds[k] = findSide(point[k], normal * lower_[k], normal * upper_[k], pull[k]);
+    if (free[k] == 0.)
+      bounds[k] = shape_ != Shape::Box
+                      ? 1
+                      : findSide(point[k], normal * lower_[k], normal * upper_[k], pull[k]);
   return bounds;
 }
 
@@ -357,9 +302,23 @@ ScaledSet::ScaledSet(const ContactSet& set, const Vector6& weights)
     : is_grasp_(set.kind() == ContactSet::Kind::Grasp), size_(int(set.size())) {
   if (is_grasp_) return;
   friction_ = ScaledSection(set.friction(), weights.head<2>() / weights[kNormal]);
-  if (size_ == 3) return;
-  moments_ = ScaledSection(set.moments(), weights.segment<2>(3) / weights[kNormal]);
-  yaw_ = set.gamma() * weights[kYaw] / weights[kNormal] * Vector2d(-1., 1.);
+  if (size_ == 6) {
+    moments_ = ScaledSection(set.moments(), weights.segment<2>(3) / weights[kNormal]);
+    high_slopes_[kYaw] = set.gamma() * weights[kYaw] / weights[kNormal];
+    low_slopes_[kYaw] = -high_slopes_[kYaw];
+  }
+  gatherSlopes();
+}
+
+// Of sections that are boxes.
+void ScaledSet::gatherSlopes() {
+  const auto gather = [&](const ScaledSection& section, int first) {
+    low_slopes_.segment<2>(first) = section.isBox() ? section.lower() : Vector2d::Zero();
+    high_slopes_.segment<2>(first) = section.isBox() ? section.upper() : Vector2d::Zero();
+  };
+  gather(friction_, 0);
+  gather(moments_, 3);
+  are_boxes_ = friction_.isBox() && moments_.isBox();
 }
 
 void ScaledSet::setUnit(const ContactSet& set, const Vector6& weights, double unit) {
@@ -368,37 +327,75 @@ void ScaledSet::setUnit(const ContactSet& set, const Vector6& weights, double un
   upper_ = set.upper().cwiseProduct(scale);
 }
 
-bool ScaledSet::isInside(const Vector6& point) const {
-  const double normal = point[kNormal];
-  return normal > lower_[kNormal] && normal < upper_[kNormal] &&
-         friction_.contains(point.head<2>(), normal) &&
-         (size_ == 3 || (moments_.contains(point.segment<2>(3), normal) &&
-                         point[kYaw] > normal * yaw_[0] && point[kYaw] < normal * yaw_[1]));
+// What a normal force leads components with bounds of their own to.
+// @param push, stiffness  Σ ∂/∂z of −½ ‖g − p‖², and 1 − Σ ∂²/∂z² of that
+inline void ScaledSet::respond(const Vector6& point, double normal, Response& response,
+                               double& push, double& stiffness) const {
+  Pair pushes = {0., 0.}, squares = {0., 0.};
+  for (int i = 0; i < size_; i += 2) {
+    const Pair g = loadPair(&point[i]);
+    const Pair slope_below = loadPair(&low_slopes_[i]), slope_above = loadPair(&high_slopes_[i]);
+    const Pair low = normal * slope_below, high = normal * slope_above;
+    const auto is_above = g > high, is_below = g < low;
+    const auto follows = ~(is_above | is_below) & (slope_below < slope_above);
+    const Pair value = is_above ? high : is_below ? low : g;
+    const Pair slope = follows ? Pair{0., 0.} : is_below ? slope_below : slope_above;
+    storePair(value, &response.force[i]);
+    storePair(follows ? Pair{1., 1.} : Pair{0., 0.}, &response.free[i]);
+    storePair(slope, &response.growth[i]);
+    pushes += (g - value) * slope;
+    squares += slope * slope;
+  }
+  push = pushes[0] + pushes[1];
+  stiffness = 1. + squares[0] + squares[1];
+  response.force[kNormal] = normal;
+  response.growth[kNormal] = 1.;
 }
 
-void ScaledSet::addPush(const Vector6& point, double normal, double& push,
-                        double& stiffness) const {
-  friction_.addPush(point.head<2>(), normal, push, stiffness);
-  if (size_ == 3) return;
-  moments_.addPush(point.segment<2>(3), normal, push, stiffness);
-  const Limited yaw = limit(point[kYaw], normal, yaw_[0], yaw_[1]);
-  push += yaw.push;
-  stiffness += yaw.by_normal * yaw.by_normal;
+// The same of sections that are no boxes.
+void ScaledSet::respondInSections(const Vector6& point, double normal, Response& response,
+                                  double& push, double& stiffness) const {
+  const auto take = [&](const ScaledSection& section, int first, Vector2d& along) {
+    if (section.isBox()) return;
+    ScaledSection::Response part;
+    section.project(point.segment<2>(first), normal, part);
+    response.force.segment<2>(first) = part.point;
+    response.free.segment<2>(first).setConstant(part.is_free ? 1. : 0.);
+    response.growth.segment<2>(first) = part.by_normal;
+    along = part.along;
+    push += part.push;
+    stiffness += part.stiffening;
+  };
+  take(friction_, 0, response.friction_along);
+  take(moments_, 3, response.moments_along);
 }
 
-// The root of z − g_z − Σ push(z), which rises; Newton's method within a bracket, from where all
-// are inside, or from zero. Returns whether it lies between the bounds of the normal force, and not
-// at one of them.
-bool ScaledSet::findNormal(const Vector6& point, double& normal) const {
+// The normal force is the root of z − g_z − Σ push(z), which rises: by Newton's method within a
+// bracket, from where all are inside, or from zero.
+void ScaledSet::project(const Vector6& point, Response& response) const {
+  response.is_free = false;
+  response.friction_along.setZero();
+  response.moments_along.setZero();
+  if (is_grasp_) {
+    const auto is_between = point.array() > lower_.array() && point.array() < upper_.array();
+    response.force = point.cwiseMax(lower_).cwiseMin(upper_);
+    response.free = is_between.select(Vector6::Ones(), 0.);
+    response.growth = Vector6::Unit(kNormal);
+    response.inverse_stiffness = std::exchange(response.free[kNormal], 0.);
+    return;
+  }
   const double pull = point[kNormal];
   double lower = lower_[kNormal], upper = upper_[kNormal];
+  double normal = std::clamp(pull, lower, upper), stiffness = 1.;
   bool is_lower_known = false, is_upper_known = false;
-  normal = std::clamp(pull, lower, upper);
-  for (int step = 0; step < kNormalSteps; ++step) {
-    double push = 0., stiffness = 1.;
-    addPush(point, normal, push, stiffness);
+  for (int step = 0;; ++step) {
+    double push = 0.;
+    respond(point, normal, response, push, stiffness);
+    if (!are_boxes_) respondInSections(point, normal, response, push, stiffness);
     const double off = normal - pull - push;
-    if (std::abs(off) <= kRounding * (normal + std::abs(pull) + std::abs(push))) break;
+    if (step == kNormalSteps ||
+        std::abs(off) <= kRounding * (normal + std::abs(pull) + std::abs(push)))
+      break;
     (off > 0. ? upper : lower) = normal;
     (off > 0. ? is_upper_known : is_lower_known) = true;
     if (!(lower < upper)) break;
@@ -411,61 +408,20 @@ bool ScaledSet::findNormal(const Vector6& point, double& normal) const {
       next = is_upper_known ? 0.5 * (lower + upper) : upper;
     normal = next;
   }
-  return normal > lower_[kNormal] && normal < upper_[kNormal];
-}
-
-void ScaledSet::project(const Vector6& point, Response& response) const {
-  if (is_grasp_) {
-    const auto isBetween = [&](int k) { return point[k] > lower_[k] && point[k] < upper_[k]; };
-    const auto isFree = [&](int k) { return isBetween(k) ? 1. : 0.; };
-    response.force = point.cwiseMax(lower_).cwiseMin(upper_);
-    response.is_free = false;
-    response.of_friction << isFree(0), 0., 0., isFree(1);
-    response.of_moments << isFree(3), 0., 0., isFree(4);
-    response.of_yaw = isFree(kYaw);
-    response.growth = Vector6::Unit(kNormal);
-    response.inverse_stiffness = isFree(kNormal);
-    return;
-  }
-  response.is_free = isInside(point);
-  if (response.is_free) {
-    response.force = point;
-    return;
-  }
-  double normal = 0.;
-  const bool is_normal_free = findNormal(point, normal);
   if (normal <= 0.) {
     response = Response();
     return;
   }
-  ScaledSection::Response part;
-  friction_.project(point.head<2>(), normal, part);
-  double stiffness = 1. + part.stiffening;
-  response.force.head<2>() = part.point;
-  response.force[kNormal] = normal;
-  response.of_friction = part.by_point;
-  response.growth.head<2>() = part.by_normal;
-  response.growth[kNormal] = 1.;
-  if (size_ == 6) {
-    moments_.project(point.segment<2>(3), normal, part);
-    const Limited yaw = limit(point[kYaw], normal, yaw_[0], yaw_[1]);
-    stiffness += part.stiffening + yaw.by_normal * yaw.by_normal;
-    response.force.tail<3>() << part.point, yaw.value;
-    response.of_moments = part.by_point;
-    response.of_yaw = yaw.by_value;
-    response.growth.tail<3>() << part.by_normal, yaw.by_normal;
-  } else {
-    response.force.tail<3>().setZero();
-    response.growth.tail<3>().setZero();
-  }
+  const bool is_normal_free = normal > lower_[kNormal] && normal < upper_[kNormal];
   response.inverse_stiffness = is_normal_free ? 1. / stiffness : 0.;
+  response.is_free = is_normal_free && response.free.sum() == size_ - 1;
 }
 
 double ScaledSet::findRate(const Vector6& direction) const {
   double rate = direction[kNormal] + friction_.support(direction.head<2>());
   if (size_ == 6)
     rate += moments_.support(direction.segment<2>(3)) +
-            std::max(direction[kYaw] * yaw_[0], direction[kYaw] * yaw_[1]);
+            std::max(direction[kYaw] * low_slopes_[kYaw], direction[kYaw] * high_slopes_[kYaw]);
   return rate;
 }
 
@@ -474,7 +430,7 @@ double ScaledSet::findRounding(const Vector6& rounding) const {
   double sum = rounding[kNormal] + friction_.findExtent().dot(rounding.head<2>());
   if (size_ == 6)
     sum += moments_.findExtent().dot(rounding.segment<2>(3)) +
-           std::max(-yaw_[0], yaw_[1]) * rounding[kYaw];
+           std::max(-low_slopes_[kYaw], high_slopes_[kYaw]) * rounding[kYaw];
   return sum;
 }
 
@@ -504,9 +460,10 @@ bool ScaledSet::expose(const Vector6& direction, const Vector6& rounding, Scaled
   face.friction_ = friction_.expose(direction.head<2>(), rounding.head<2>());
   if (size_ == 6) {
     face.moments_ = moments_.expose(direction.segment<2>(3), rounding.segment<2>(3));
-    if (direction[kYaw] > rounding[kYaw]) face.yaw_[0] = yaw_[1];
-    if (direction[kYaw] < -rounding[kYaw]) face.yaw_[1] = yaw_[0];
+    if (direction[kYaw] > rounding[kYaw]) face.low_slopes_[kYaw] = high_slopes_[kYaw];
+    if (direction[kYaw] < -rounding[kYaw]) face.high_slopes_[kYaw] = low_slopes_[kYaw];
   }
+  face.gatherSlopes();
   const double rate = findRate(direction), tolerance = findRounding(rounding);
   if (rate > tolerance) face.lower_[kNormal] = upper_[kNormal];
   if (rate < -tolerance) face.upper_[kNormal] = lower_[kNormal];
@@ -522,21 +479,22 @@ void ScaledSet::hold(const Response& response, const Vector6& direction, ScaledS
   const auto fixAt = [&](int k) { face.lower_[k] = face.upper_[k] = x[k]; };
   if (response.inverse_stiffness == 0.) fixAt(kNormal);
   if (is_grasp_) {
-    for (int k = 0; k < 2; ++k) {
-      if (response.of_friction(k, k) == 0.) fixAt(k);
-      if (response.of_moments(k, k) == 0.) fixAt(3 + k);
-    }
-    if (response.of_yaw == 0.) fixAt(kYaw);
+    for (int k = 0; k < 6; ++k)
+      if (k != kNormal && response.free[k] == 0.) fixAt(k);
     return;
   }
   const double normal = x[kNormal];
   if (normal <= 0.) return;
-  face.friction_ =
-      friction_.hold(x.head<2>(), response.of_friction, normal, direction.head<2>(), bend.friction);
-  if (size_ == 3) return;
-  face.moments_ = moments_.hold(x.segment<2>(3), response.of_moments, normal,
-                                direction.segment<2>(3), bend.moments);
-  if (response.of_yaw == 0.) face.yaw_.setConstant(x[kYaw] / normal);
+  face.friction_ = friction_.hold(x.head<2>(), response.free.head<2>(), response.friction_along,
+                                  normal, direction.head<2>(), bend.friction);
+  if (size_ == 6) {
+    face.moments_ =
+        moments_.hold(x.segment<2>(3), response.free.segment<2>(3), response.moments_along, normal,
+                      direction.segment<2>(3), bend.moments);
+    if (response.free[kYaw] == 0.)
+      face.low_slopes_[kYaw] = face.high_slopes_[kYaw] = x[kYaw] / normal;
+  }
+  face.gatherSlopes();
 }
 
 ScaledSet::Span ScaledSet::span() const {
@@ -568,10 +526,10 @@ ScaledSet::Span ScaledSet::span() const {
       axis.segment<2>(3) = moments.axes.col(k);
       add(axis);
     }
-    if (yaw_[0] < yaw_[1])
+    if (low_slopes_[kYaw] < high_slopes_[kYaw])
       add(Vector6::Unit(kYaw));
     else
-      growth[kYaw] = yaw_[0];
+      growth[kYaw] = low_slopes_[kYaw];
   }
   if (lower_[kNormal] < upper_[kNormal])
     add(growth);
@@ -588,21 +546,19 @@ Eigen::Matrix<signed char, 6, 1> ScaledSet::findBounds(const Response& response,
   const auto findOwn = [&](int k) { return findSide(x[k], lower_[k], upper_[k], pull[k]); };
   if (response.inverse_stiffness == 0.) bounds[kNormal] = findOwn(kNormal);
   if (is_grasp_) {
-    const Vector6 free = (Vector6() << response.of_friction.diagonal(), 1.,
-                          response.of_moments.diagonal(), response.of_yaw)
-                             .finished();
     for (int k = 0; k < 6; ++k)
-      if (free[k] == 0.) bounds[k] = findOwn(k);
+      if (k != kNormal && response.free[k] == 0.) bounds[k] = findOwn(k);
     return bounds;
   }
   const double normal = x[kNormal];
   bounds.head<2>() =
-      friction_.findBounds(x.head<2>(), response.of_friction, normal, pull.head<2>());
+      friction_.findBounds(x.head<2>(), response.free.head<2>(), normal, pull.head<2>());
   if (size_ == 3) return bounds;
   bounds.segment<2>(3) =
-      moments_.findBounds(x.segment<2>(3), response.of_moments, normal, pull.segment<2>(3));
-  if (response.of_yaw == 0.)
-    bounds[kYaw] = findSide(x[kYaw], normal * yaw_[0], normal * yaw_[1], pull[kYaw]);
+      moments_.findBounds(x.segment<2>(3), response.free.segment<2>(3), normal, pull.segment<2>(3));
+  if (response.free[kYaw] == 0.)
+    bounds[kYaw] =
+        findSide(x[kYaw], normal * low_slopes_[kYaw], normal * high_slopes_[kYaw], pull[kYaw]);
   return bounds;
 }
 

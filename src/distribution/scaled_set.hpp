@@ -17,8 +17,9 @@ class ScaledSection {
   /// The projection p of a point g on z times the section, and how it changes with both.
   struct Response {
     Vector2 point = Vector2::Zero();
-    Eigen::Matrix2d by_point = Eigen::Matrix2d::Zero();  ///< ∂p/∂g, symmetric
-    Vector2 by_normal = Vector2::Zero();                 ///< ∂p/∂z
+    bool is_free = false;             ///< whether ∂p/∂g = 1
+    Vector2 along = Vector2::Zero();  ///< else it is along alongᵀ: on a boundary of one dimension
+    Vector2 by_normal = Vector2::Zero();  ///< ∂p/∂z
     double push = 0.;  ///< −∂/∂z of ½ ‖g − p‖²: what of g is beyond the section asks of z
     double stiffening = 0.;  ///< ∂²/∂z² of the same
   };
@@ -35,13 +36,14 @@ class ScaledSection {
   /// @param scale  of each coordinate
   ScaledSection(const Section& section, const Vector2& scale);
 
-  /// Whether a point is inside, away from what has no extent.
-  bool contains(const Vector2& point, double normal) const;
+  /// Whether components have bounds of their own: then they are theirs to look after.
+  bool isBox() const { return shape_ == Shape::Box; }
+  /// Of boxes.
+  const Vector2& lower() const { return lower_; }
+  const Vector2& upper() const { return upper_; }
 
+  /// Of sections that are no boxes.
   void project(const Vector2& point, double normal, Response& response) const;
-
-  /// Adds Response::push and Response::stiffening.
-  void addPush(const Vector2& point, double normal, double& push, double& stiffening) const;
 
   /// The support function.
   double support(const Vector2& direction) const;
@@ -55,15 +57,15 @@ class ScaledSection {
 
   /// The face that a projection has come to at a normal force > 0: of a curved boundary the point
   /// that a direction exposes.
-  /// @param point, by_point  of its response
-  /// @param bend             ∂p/∂direction of that point; zero where the face stays
-  ScaledSection hold(const Vector2& point, const Eigen::Matrix2d& by_point, double normal,
-                     const Vector2& direction, Eigen::Matrix2d& bend) const;
+  /// @param free, along  of the set's response
+  /// @param bend         ∂p/∂direction of that point is bend bendᵀ; zero where the face stays
+  ScaledSection hold(const Vector2& point, const Vector2& free, const Vector2& along, double normal,
+                     const Vector2& direction, Vector2& bend) const;
 
   Span span() const;
 
   /// See ScaledSet::findBounds().
-  Eigen::Matrix<signed char, 2, 1> findBounds(const Vector2& point, const Eigen::Matrix2d& by_point,
+  Eigen::Matrix<signed char, 2, 1> findBounds(const Vector2& point, const Vector2& free,
                                               double normal, const Vector2& pull) const;
 
  private:
@@ -99,21 +101,23 @@ class ScaledSet {
 
   /// The projection of a point on the set, and its generalised Jacobian, which is symmetric:
   ///
-  ///     ∂x/∂g = diag(of_friction, 0, of_moments, of_yaw) + growth growthᵀ / stiffness
+  ///     ∂x/∂g = diag(free) + along alongᵀ of both sections + growth growthᵀ / stiffness
   ///
   /// or 1 where the point is inside, and nothing but the force is set.
   struct Response {
     Vector6 force = Vector6::Zero();
     bool is_free = false;
-    Eigen::Matrix2d of_friction = Eigen::Matrix2d::Zero(), of_moments = Eigen::Matrix2d::Zero();
-    double of_yaw = 0.;
+    Vector6 free = Vector6::Zero();  ///< 1 for components that follow the point, else 0
+    Eigen::Vector2d friction_along = Eigen::Vector2d::Zero();
+    Eigen::Vector2d moments_along = Eigen::Vector2d::Zero();
     Vector6 growth = Vector6::Zero();  ///< by which a normal force that is free takes the others
     double inverse_stiffness = 0.;
   };
 
-  /// ∂x/∂direction of the points of curved boundaries that a direction exposes.
+  /// The points of curved boundaries that a direction exposes: ∂x/∂direction is friction frictionᵀ,
+  /// moments momentsᵀ.
   struct Bend {
-    Eigen::Matrix2d friction = Eigen::Matrix2d::Zero(), moments = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d friction = Eigen::Vector2d::Zero(), moments = Eigen::Vector2d::Zero();
   };
 
   /// Forces of a face are fixed + Σ cᵢ axesᵢ.
@@ -155,16 +159,21 @@ class ScaledSet {
   Eigen::Matrix<signed char, 6, 1> findBounds(const Response& response, const Vector6& pull) const;
 
  private:
-  bool isInside(const Vector6& point) const;
-  void addPush(const Vector6& point, double normal, double& push, double& stiffness) const;
-  bool findNormal(const Vector6& point, double& normal) const;
+  void gatherSlopes();
+  void respond(const Vector6& point, double normal, Response& response, double& push,
+               double& stiffness) const;
+  void respondInSections(const Vector6& point, double normal, Response& response, double& push,
+                         double& stiffness) const;
   double findRate(const Vector6& direction) const;
   double findRounding(const Vector6& rounding) const;
 
   bool is_grasp_ = false;
   int size_ = 3;
   ScaledSection friction_, moments_;
-  Eigen::Vector2d yaw_ = Eigen::Vector2d::Zero();  // bounds, over the normal force
+  bool are_boxes_ = true;  // whether both are
+  // Bounds of components over the normal force: those of the yaw, and of sections that are boxes;
+  // of others both are zero.
+  Vector6 low_slopes_ = Vector6::Zero(), high_slopes_ = Vector6::Zero();
   Vector6 lower_ = Vector6::Zero(), upper_ = Vector6::Zero();
 };
 
