@@ -632,7 +632,8 @@ bool WrenchDistribution::Workspace::solveSets(double minimal_scale) {
   sets.setMaximalIterations(maximal_iterations);
   sets.setWarmStart(warm_start);
   const DistributionSolution& solution =
-      std::exchange(are_sets_new, false) ? sets.solve(problem) : sets.solveMoved(problem);
+      are_sets_new ? sets.solve(problem) : sets.solveMoved(problem);
+  are_sets_new = false;
   if (has_sets) result.scale = problem.scale();
   result.status = solution.status;
   result.iterations = solution.iterations;

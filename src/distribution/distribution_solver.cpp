@@ -328,7 +328,7 @@ bool DistributionSolution::isOptimal(const DistributionProblem& problem, double 
     // What is hardly out of reach has no multipliers but on faces.
     return size <= Tolerances::reach * scale * (1. + tolerance) &&
            (isCheapest(*this, problem, tolerance, false) ||
-            isCheapest(*this, problem, tolerance, true));
+            (size > Tolerances::some * scale && isCheapest(*this, problem, tolerance, true)));
   return status == DistributionStatus::Relaxed &&
          size >= Tolerances::reach * scale * (1. - tolerance) &&
          isCheapest(*this, problem, tolerance, true);
@@ -590,8 +590,9 @@ DistributionStatus DistributionSolver::Workspace::search() {
       if (status != DistributionStatus::NumericalFailure && is_accurate) return status;
     }
     iterations_in_vain = std::exchange(iterations, 0);
-    is_cut = false;
+    is_cut = is_on_faces = is_clear = false;
     is_accurate = true;
+    residual.setZero();
   }
   if (startFree() && descend(&Block::set, 0., multipliers, Tolerances::direct_steps)) {
     is_found_at_once = iterations == 1;
@@ -787,6 +788,7 @@ bool DistributionSolver::Workspace::relax(const Vector6& start, Effort effort) {
     }
     evaluate(kept, &Block::set);
   }
+  is_accurate = is_clear = false;
   residual.setZero();
   return false;
 }
